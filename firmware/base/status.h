@@ -1,0 +1,16 @@
+/* The status table: every error by number and words (status.def).
+ *
+ * Context: main loop; pure. Tests: test/host/test_status.c */
+#ifndef BASE_STATUS_H
+#define BASE_STATUS_H
+
+#include <stdint.h>
+
+typedef enum {
+    STATUS_OK = 0,
+#define STATUS(name, number, words, remedy) STATUS_##name = (number),
+#include "base/status.def"
+#undef STATUS
+} status_t;
+
+#endif
