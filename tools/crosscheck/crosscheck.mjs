@@ -9,12 +9,8 @@ import { readFileSync, writeFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { cases } from './cases.mjs';
+import { compare } from './compare.mjs';
 import { CPU_HZ, runWitness } from './witness.mjs';
-
-/* Bounds in cycles. Their reasons stand in docs/crosscheck.md. */
-const EXACT_BOUND = 0; /* avr8js' counter against the board's pin: any interval, any sum of intervals */
-const RAW_BOUND = 8; /* avr8js' pin against the board's pin, likewise: what it lags behind its counter */
-const START_BOUND = 3200; /* from a line typed to its first edge: software, run at other latencies */
 
 const FIRST_LINE_MS = 300; /* the prompt is out by then */
 const PROBE_CYCLES = 1_500_000;
@@ -59,48 +55,6 @@ function probeTrains() {
             if (kind === 'PULSES') trains[trains.length - 1].push(at + ticks - PROBE_PULSE);
     }
     return trains;
-}
-
-/* Greatest difference between two lists of times: of neighbours, and since the first of all. */
-function difference(a, b) {
-    let interval = 0;
-    let drift = 0;
-    for (let i = 1; i < a.length; i++) {
-        interval = Math.max(interval, Math.abs(a[i] - a[i - 1] - (b[i] - b[i - 1])));
-        drift = Math.max(drift, Math.abs(a[i] - a[0] - (b[i] - b[0])));
-    }
-    return { interval, drift };
-}
-
-/* Compares witness and board; trains: number of pulses of each start from standstill. Returns the row of the table. */
-function compare(name, witness, board, trains) {
-    const row = { name, edges: board.edges.length, exact: 0, drift: 0, raw: 0, rawDrift: 0, start: 0, faults: [] };
-    const wanted = trains.reduce((sum, pulses) => sum + pulses, 0);
-    if (witness.edges.length !== board.edges.length)
-        row.faults.push(`avr8js made ${witness.edges.length} edges, the board ${board.edges.length}`);
-    if (board.edges.length !== wanted) row.faults.push(`${wanted} edges were commanded, the board made ${board.edges.length}`);
-    const both = Math.min(witness.edges.length, board.edges.length);
-    const turned = board.edges.slice(0, both).findIndex((edge, i) => edge.dir !== witness.edges[i].dir);
-    if (turned >= 0) row.faults.push(`dir differs at edge ${turned + 1}`);
-    let from = 0;
-    for (const pulses of trains) {
-        const to = Math.min(from + pulses, both);
-        if (from >= to) break;
-        const pins = board.edges.slice(from, to).map((edge) => edge.cycle);
-        const exact = difference(witness.edges.slice(from, to).map((edge) => edge.exact), pins);
-        const raw = difference(witness.edges.slice(from, to).map((edge) => edge.raw), pins);
-        row.exact = Math.max(row.exact, exact.interval);
-        row.drift = Math.max(row.drift, exact.drift);
-        row.raw = Math.max(row.raw, raw.interval);
-        row.rawDrift = Math.max(row.rawDrift, raw.drift);
-        row.start = Math.max(row.start, Math.abs(witness.edges[from].exact - pins[0]));
-        from = to;
-    }
-    if (row.exact > EXACT_BOUND) row.faults.push(`an interval differs by ${row.exact} cycles`);
-    if (row.drift > EXACT_BOUND) row.faults.push(`the time since the first edge differs by ${row.drift} cycles`);
-    if (Math.max(row.raw, row.rawDrift) > RAW_BOUND) row.faults.push(`avr8js' pin lags by ${row.rawDrift} cycles`);
-    if (row.start > START_BOUND) row.faults.push(`a first edge differs by ${row.start} cycles`);
-    return row;
 }
 
 async function runBoth(options) {

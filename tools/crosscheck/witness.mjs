@@ -8,7 +8,7 @@ import { readFileSync } from 'node:fs';
 import avr8js from 'avr8js';
 
 const { CPU, AVRIOPort, AVRTimer, AVRUSART, AVREEPROM, EEPROMMemoryBackend, AVRClock, AVRWatchdog } = avr8js;
-const { avrInstruction, PinState } = avr8js;
+const { avrInstruction } = avr8js;
 
 export const CPU_HZ = 16_000_000;
 const FLASH_BYTES = 0x8000;
@@ -37,12 +37,7 @@ export function loadHex(path) {
  * the cycle at which its counter met OCR1B; glitches counts pulses of no length. */
 export function runWitness({ hexPath, typed = [], untilCycle, charCycles = 10 * (CPU_HZ / 38400), rxDelay = 4004 }) {
     const cpu = new CPU(new Uint16Array(loadHex(hexPath).buffer), RAM_BYTES);
-    new AVRClock(cpu, CPU_HZ);
-    new AVRWatchdog(cpu, new AVRClock(cpu, CPU_HZ), {
-        watchdogInterrupt: 0x0c,
-        MCUSR: 0x54,
-        WDTCSR: 0x60,
-    });
+    new AVRWatchdog(cpu, avr8js.watchdogConfig, new AVRClock(cpu, CPU_HZ));
     const portB = new AVRIOPort(cpu, avr8js.portBConfig);
     const portC = new AVRIOPort(cpu, avr8js.portCConfig);
     const portD = new AVRIOPort(cpu, avr8js.portDConfig);
