@@ -16,6 +16,10 @@ const RAM_BYTES = 0x800;
 const EEPROM_BYTES = 1024;
 const CLK_BIT = 1 << 2;
 const DIR_BIT = 1 << 5;
+/* Start bit to RXC0 at 38,400 Bd: 153 samples of 26 cycles, and half a sample till the first (datasheet 20.8). */
+const RX_DELAY = 153 * 26 + 13;
+const RXC_BIT = 1 << 7;
+const RXEN_BIT = 1 << 4;
 const FAST_PWM = 3; /* avr8js' number for the family of modes */
 
 /* Intel HEX with data records only, as avr-objcopy writes it. */
@@ -31,11 +35,23 @@ export function loadHex(path) {
     return flash;
 }
 
+/* In avr8js each write of UCSR0B forgets a byte that has been received and not yet read; on the chip RXC0 stays set. */
+function keepReceived(cpu, usart) {
+    const { UCSRA, UCSRB } = usart.config;
+    const write = cpu.writeHooks[UCSRB];
+    cpu.writeHooks[UCSRB] = (value, ...rest) => {
+        const received = cpu.data[UCSRA] & RXC_BIT;
+        const written = write(value, ...rest);
+        if (received && value & RXEN_BIT) cpu.setInterruptFlag(usart.RXC);
+        return written;
+    };
+}
+
 /* typed: [{ cycle, text }], bytes back to back from that cycle on; charCycles: 10 bits as the sender times them.
  * rxDelay: from the falling edge of the start bit to the byte in the receiver.
  * Returns { edges: [{ raw, exact, dir }], glitches, text }: raw is the cycle at which avr8js has moved the pin, exact
  * the cycle at which its counter met OCR1B; glitches counts pulses of no length. */
-export function runWitness({ hexPath, typed = [], untilCycle, charCycles = 10 * (CPU_HZ / 38400), rxDelay = 4004 }) {
+export function runWitness({ hexPath, typed = [], untilCycle, charCycles = 10 * (CPU_HZ / 38400), rxDelay = RX_DELAY }) {
     const cpu = new CPU(new Uint16Array(loadHex(hexPath).buffer), RAM_BYTES);
     new AVRWatchdog(cpu, avr8js.watchdogConfig, new AVRClock(cpu, CPU_HZ));
     const portB = new AVRIOPort(cpu, avr8js.portBConfig);
@@ -52,6 +68,7 @@ export function runWitness({ hexPath, typed = [], untilCycle, charCycles = 10 * 
     new AVREEPROM(cpu, new EEPROMMemoryBackend(EEPROM_BYTES));
     const usart = new AVRUSART(cpu, avr8js.usart0Config, CPU_HZ);
     usart.UDRE.constant = true; /* or the flag is lost when its vector is entered */
+    keepReceived(cpu, usart);
 
     let text = '';
     usart.onByteTransmit = (byte) => {
