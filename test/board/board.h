@@ -76,7 +76,7 @@ void board_uart_baud(board_t *b, double baud); /* of the peer; also decodes what
 void board_uart_send(board_t *b, const void *bytes, size_t count);
 void board_uart_send_text(board_t *b, const char *text);
 void board_uart_gap(board_t *b, uint64_t cycles); /* idle line between what was and what will be appended */
-void board_uart_send_bad(board_t *b, uint8_t byte); /* with a low stop bit: a framing error */
+void board_uart_send_bad(board_t *b, uint8_t byte); /* with a low stop bit (a framing error) and one idle bit after it */
 bool board_uart_sending(const board_t *b);
 uint64_t board_uart_last_sent(const board_t *b); /* cycle at which the last appended byte's stop bit ended */
 typedef struct {
@@ -88,6 +88,8 @@ typedef struct {
 const board_uart_byte_t *board_uart_received(const board_t *b, size_t *count);
 const char *board_uart_text(const board_t *b); /* the same as a NUL-terminated string, valid until the next run */
 void board_uart_clear(board_t *b);
+/* Called for every byte that the board has sent, when its stop bit ends, instead of storing it. NULL: store again. */
+void board_on_uart(board_t *b, void (*fn)(void *ctx, board_uart_byte_t byte), void *ctx);
 uint32_t board_uart_overruns(const board_t *b); /* bytes lost by the board's receiver (DOR) */
 
 /* -- memory ---------------------------------------------------------------------------------------------------- */
