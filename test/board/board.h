@@ -69,6 +69,13 @@ void board_edges_clear(board_t *b);
 /* Called at every edge of the recorded pins, at its exact cycle, instead of storing it. NULL: store again. */
 void board_on_edge(board_t *b, void (*fn)(void *ctx, board_edge_t edge), void *ctx);
 
+/* -- timers ---------------------------------------------------------------------------------------------------- */
+
+/* When fast PWM sets TOVn. The datasheet says "each time the counter reaches TOP" (15.7.3, 16.9.3), its figures 15-9 and
+ * 16-12 draw it where the counter leaves TOP for BOTTOM, one timer clock later. Firmware must bear both. */
+typedef enum { BOARD_TOV_REACHING_TOP, BOARD_TOV_LEAVING_TOP } board_tov_t;
+void board_fast_pwm_tov(board_t *b, board_tov_t when); /* until board_free(); at first BOARD_TOV_REACHING_TOP */
+
 /* -- hardware serial port (USART0) ------------------------------------------------------------------------------ */
 
 void board_uart_baud(board_t *b, double baud); /* of the peer; also decodes what the board sends. Default 38400 */
@@ -76,7 +83,8 @@ void board_uart_baud(board_t *b, double baud); /* of the peer; also decodes what
 void board_uart_send(board_t *b, const void *bytes, size_t count);
 void board_uart_send_text(board_t *b, const char *text);
 void board_uart_gap(board_t *b, uint64_t cycles); /* idle line between what was and what will be appended */
-void board_uart_send_bad(board_t *b, uint8_t byte); /* with a low stop bit (a framing error) and one idle bit after it */
+/* With a low stop bit (a framing error) and one idle bit after it. */
+void board_uart_send_bad(board_t *b, uint8_t byte);
 bool board_uart_sending(const board_t *b);
 uint64_t board_uart_last_sent(const board_t *b); /* cycle at which the last appended byte's stop bit ended */
 typedef struct {
@@ -101,7 +109,7 @@ uint32_t board_peek32(const board_t *b, uint16_t address);
 void board_poke8(board_t *b, uint16_t address, uint8_t value);
 void board_poke16(board_t *b, uint16_t address, uint16_t value);
 void board_poke32(board_t *b, uint16_t address, uint32_t value);
-uint8_t *board_eeprom(board_t *b);          /* the cells; BOARD_EEPROM_BYTES */
+uint8_t *board_eeprom(board_t *b);                    /* the cells; BOARD_EEPROM_BYTES */
 void board_eeprom_cut_at(board_t *b, uint64_t cycle); /* power fails at that cycle: a write in progress leaves its
                                                          cell as torn_byte; the board then stands at a power-on reset */
 void board_eeprom_torn_byte(board_t *b, uint8_t value);

@@ -6,8 +6,8 @@
  *
  * Time. A cycle stamp names a rising edge of the CPU clock. An instruction of n cycles that starts at c writes an I/O
  * register at the edge that ends it, c + n, and reads one in its last cycle, so it sees what happened up to c + n - 1.
- * Every hook must ask for that stamp with io_write_cycle() or io_read_cycle(): these first run all events that are due
- * until then, each with its own stamp, so that a hook finds the board as it is at that cycle.
+ * Hooks are given that stamp; before a hook runs, all events due until then have run, each with its own stamp, so that
+ * a hook finds the board as it is at that cycle.
  * When an event and a write fall on the same edge the event comes first.
  *
  * A model exports (listed below): xxx_init(b) once, after simavr is up: allocate state, register hooks and
@@ -21,8 +21,8 @@
 #include <simavr/sim_avr.h>
 
 #define BOARD_FLASH_BYTES 0x8000u
-#define BOARD_RAM_START 0x0100u
-#define BOARD_RAMEND 0x08FFu
+#define BOARD_RAM_START   0x0100u
+#define BOARD_RAMEND      0x08FFu
 
 #define NEVER UINT64_MAX
 
@@ -114,18 +114,21 @@ uint8_t reg_written_ones(const board_t *b, uint8_t value);
 
 /* What a peripheral does to a port pin, 14.3: */
 typedef enum {
-    PIN_FREE,        /* PORT and DDR decide */
-    PIN_VALUE,       /* the peripheral's level replaces PORT; DDR still decides (OCnx) */
-    PIN_OUTPUT,      /* level and direction overridden: an output (TXD) */
-    PIN_INPUT,       /* direction overridden: an input, the pull-up still follows PORT (RXD) */
+    PIN_FREE,   /* PORT and DDR decide */
+    PIN_VALUE,  /* the peripheral's level replaces PORT; DDR still decides (OCnx) */
+    PIN_OUTPUT, /* level and direction overridden: an output (TXD) */
+    PIN_INPUT,  /* direction overridden: an input, the pull-up still follows PORT (RXD) */
 } pin_override_t;
 void pin_override(board_t *b, board_pin_t pin, pin_override_t how, int level, uint64_t cycle);
 
-int pin_level(const board_t *b, board_pin_t pin);                          /* of the pad, as it is now */
-void pin_drive(board_t *b, board_pin_t pin, int level, uint64_t cycle);    /* from outside; -1 floats */
+int pin_level(const board_t *b, board_pin_t pin);                       /* of the pad, as it is now */
+void pin_drive(board_t *b, board_pin_t pin, int level, uint64_t cycle); /* from outside; -1 floats */
 /* Is an edge of this pin seen by anybody (recorder, wire, interrupt)? If not, a model may produce its edges late, when
  * its registers or the port are read. */
 bool pin_watched(const board_t *b, board_pin_t pin);
+/* fn is called at every edge of that pin (T0, T1, ICP1, RXD); one listener a pin. */
+typedef void (*pin_listener_t)(board_t *b, int level, uint64_t cycle);
+void pin_listen(board_t *b, board_pin_t pin, pin_listener_t fn);
 
 /* -- crashes -------------------------------------------------------------------------------------------------------- */
 
@@ -142,9 +145,9 @@ void board_crashed(board_t *b, const char *format, ...) __attribute__((format(pr
     MODEL(watchdog)         \
     MODEL(reset)
 
-#define MODEL_PROTOTYPES(name)      \
-    void name##_init(board_t *b);   \
-    void name##_reset(board_t *b);  \
+#define MODEL_PROTOTYPES(name)     \
+    void name##_init(board_t *b);  \
+    void name##_reset(board_t *b); \
     void name##_free(board_t *b);
 BOARD_MODELS(MODEL_PROTOTYPES)
 #undef MODEL_PROTOTYPES
@@ -153,15 +156,19 @@ BOARD_MODELS(MODEL_PROTOTYPES)
  * from board_reset(), after it has decided what MCUSR will be and before it writes MCUSR. Takes effect at once: inside
  * an event or a hook, return right after it. */
 void cpu_reset(board_t *b);
+/* A peripheral halts the CPU after the instruction being executed (EEPROM access, 8.6.3); from a register hook only. */
+static inline void cpu_halt(board_t *b, unsigned cycles);
+/* For reset.c: a write to EEPROM is torn (eeprom.c); WDRF holds WDE (watchdog.c). */
+void eeprom_power_fails(board_t *b);
+void watchdog_force(board_t *b);
 /* The instruction WDR was executed (watchdog.c). */
 void watchdog_wdr(board_t *b, uint64_t cycle);
-/* The initial cells (NULL: erased) and the image's .eeprom section, called by board_new() after eeprom_init(): eeprom.c */
+/* The initial BOARD_EEPROM_BYTES cells, NULL: erased; called by board_new() after eeprom_init() (eeprom.c). */
 void eeprom_load(board_t *b, const uint8_t *cells);
 
 /* -- the board ------------------------------------------------------------------------------------------------------- */
 
 typedef struct {
-    board_isr_t *vector_figures;
     uint64_t start;  /* first cycle of the entry */
     uint64_t nested; /* cycles spent in interrupts inside this one */
     uint8_t vector;
@@ -172,11 +179,14 @@ typedef struct {
 typedef struct {
     char *name;
     uint16_t address;
+    bool global;
 } board_symbol_t;
 
 struct board {
     avr_t *avr;
+    avr_io_t instructions; /* hears simavr's requests for WDR and SPM */
     char crash[160];
+    bool was_reset; /* cpu_reset() ran inside the running instruction */
 
     /* time */
     uint64_t event_cycle[EVENT_SLOTS];
@@ -197,13 +207,15 @@ struct board {
     board_measures_t measures;
     uint64_t measures_since;
     uint64_t masked_since; /* NEVER: start-up, before the first SEI, is not counted */
-    bool i_seen;           /* SREG's I after the last instruction */
+    uint64_t sleep_since;
+    bool i_seen; /* SREG's I after the last instruction */
 
     /* image */
     uint32_t code_end;    /* first flash byte after the image */
     uint16_t stack_limit; /* first RAM byte after .bss and .noinit */
     board_symbol_t *symbols;
     size_t symbol_count;
+    uint8_t *image_eeprom; /* the .eeprom section, BOARD_EEPROM_BYTES; NULL: none */
 
     /* hooks of registers: simavr's own carry one pointer, the board; these carry the models' functions */
     reg_read_fn reg_read[0x100];
@@ -219,29 +231,31 @@ struct board {
     struct reset *reset;
 };
 
+/* simavr adds the instruction's own cycles when the hook has returned. */
+static inline void cpu_halt(board_t *b, unsigned cycles) {
+    b->avr->cycle += cycles;
+}
+
 /* Between models of the core. */
 void events_run_until(board_t *b, uint64_t cycle);
-static inline void events_run(board_t *b, uint64_t cycle)
-{
+static inline void events_run(board_t *b, uint64_t cycle) {
     if (b->next_event <= cycle)
         events_run_until(b, cycle);
 }
-void timers_sync(board_t *b, uint64_t cycle);  /* brings counters, flags and OC pins up to date */
-void timers_replan(board_t *b);                /* after a change of who watches which pin */
-void timers_t0_edge(board_t *b, int level, uint64_t cycle);
-void timers_t1_edge(board_t *b, int level, uint64_t cycle);
-void timers_icp_edge(board_t *b, int level, uint64_t cycle);
+void timers_sync(board_t *b, uint64_t cycle); /* brings counters, flags and OC pins up to date */
+void timers_replan(board_t *b);               /* after a change of who watches which pin */
 void extint_pins_changed(board_t *b, int port, uint8_t levels, uint8_t changed, uint64_t cycle);
 uint8_t extint_watched(const board_t *b, int port); /* pins whose edges the interrupt logic looks at */
 uint64_t board_time(const board_t *b);              /* stamp of the event being run, or the CPU's cycle */
 
 bool irq_dispatch(board_t *b); /* enters the most urgent vector, if any is allowed */
 
-void image_load(board_t *b, const char *elf_path, bool *ok); /* elf.c */
+bool image_load(board_t *b, const char *elf_path); /* image.c */
 void image_free(board_t *b);
-/* The image's .eeprom section, copied over the erased cells by board_new() unless cells were given. */
-size_t image_eeprom(const board_t *b, uint8_t *cells, size_t size);
-
-void measures_step(board_t *b, uint32_t pc_before);
+/* measures.c, called by the processor loop */
+void measures_reset(board_t *b);
+void measures_i_changed(board_t *b, uint32_t pc); /* SREG's I is not what it was after the last instruction */
+void measures_enter(board_t *b, int vector, uint64_t start);
+void measures_reti(board_t *b);
 
 #endif

@@ -1,0 +1,11 @@
+# The simulated board's core: processor, interrupts, pins, timers, measures, and their tests. The serial port, EEPROM,
+# watchdog and resets: models.mk. The Makefile builds BOARD_SRCS into build/libboard.a, BOARD_TESTS from test/board/<name>.c
+# and BOARD_PROGRAMS from test/board/programs/<name>.c or .S.
+
+BOARD_SRCS += $(addprefix test/board/, board.c events.c extint.c image.c irq.c measures.c pins.c registers.c \
+    simavr_glue.c timer.c timer16.c timer8.c timers.c)
+BOARD_TESTS +=
+BOARD_PROGRAMS +=
+BOARD_CFLAGS += -Itest/board
+# simavr's static library; whatever the board defines itself stays out of the link (simavr_glue.c).
+BOARD_LIBS += -l:libsimavr.a -lelf -lm -lpthread
