@@ -13,4 +13,7 @@ typedef enum {
 #undef STATUS
 } status_t;
 
+/* The words of an error, in flash (base/flash.h); an empty text for STATUS_OK. */
+const char *status_words(status_t status);
+
 #endif

@@ -1,0 +1,321 @@
+#include "cli/commands.h"
+#include "base/flash.h"
+#include "cli/display.h"
+#include "cli/motion_syntax.h"
+#include "cli/timebase_port.h"
+#include "motion/engine.h"
+#include "queue/queue.h"
+#include "queue/session.h"
+
+typedef enum { CASE_ANY, CASE_EXACT } case_rule_t;
+typedef enum { ARGUMENT_NONE, ARGUMENT_REST } argument_t;
+
+typedef struct {
+    char first;
+    char second; /* 0: one letter is enough */
+    uint8_t case_rule;
+    uint8_t argument;
+    status_t (*handler)(const char *rest);
+    const char *form;
+    const char *help;
+} command_row_t;
+
+static bool debugging;
+static const char *refused_range; /* for STATUS_RANGE */
+
+/* The motion command being read ahead: how many characters of the line it has seen, 0 for none. */
+static motion_syntax_t ahead;
+static uint8_t characters_ahead;
+
+/* The end of the command: of the line, or a space. */
+static bool is_end(char c)
+{
+    return c == '\0' || c == ' ';
+}
+
+/* -- handlers: rest is what follows the command's letters, up to the space or the end of the line --------------------- */
+
+static status_t command_motion(const char *rest)
+{
+    (void)rest; /* read ahead */
+    session_t defaults = session;
+    status_t status = motion_syntax_end(&ahead, &defaults);
+    refused_range = ahead.range;
+    if (status == STATUS_OK) {
+        status = queue_add(&ahead.command);
+    }
+    if (status == STATUS_OK) {
+        session = defaults;
+    }
+    return status;
+}
+
+/* v, vc, a, d alone: the same rules as within a motion command. rest[-1] is the command's letter. */
+static status_t command_session_value(const char *rest)
+{
+    motion_syntax_begin(&ahead, rest[-1], &session);
+    for (; *rest != '\0'; rest++) {
+        motion_syntax_take(&ahead, *rest);
+    }
+    const status_t status = motion_syntax_end(&ahead, &session);
+    refused_range = ahead.range;
+    return status;
+}
+
+static status_t command_show_velocity(const char *rest)
+{
+    (void)rest;
+    return display_request(DISPLAY_VELOCITY);
+}
+
+static status_t command_show_queue(const char *rest)
+{
+    (void)rest;
+    return display_request(DISPLAY_QUEUE);
+}
+
+static status_t command_show_defaults(const char *rest)
+{
+    (void)rest;
+    return display_request(DISPLAY_DEFAULTS);
+}
+
+static status_t command_show_position(const char *rest)
+{
+    (void)rest;
+    return display_request(DISPLAY_POSITION);
+}
+
+static status_t command_help(const char *rest)
+{
+    (void)rest;
+    return display_request(DISPLAY_HELP);
+}
+
+static status_t command_pulse_cw(const char *rest)
+{
+    (void)rest;
+    engine_single_pulse(false);
+    return STATUS_OK;
+}
+
+static status_t command_pulse_ccw(const char *rest)
+{
+    (void)rest;
+    engine_single_pulse(true);
+    return STATUS_OK;
+}
+
+static status_t command_stop(const char *rest)
+{
+    (void)rest;
+    queue_stop();
+    return STATUS_OK;
+}
+
+static status_t command_stop_graceful(const char *rest)
+{
+    (void)rest;
+    queue_stop_graceful(session.decel, session.flags & MOTION_LINEAR);
+    return STATUS_OK;
+}
+
+static status_t command_next(const char *rest)
+{
+    (void)rest;
+    queue_next();
+    return STATUS_OK;
+}
+
+static status_t command_next_graceful(const char *rest)
+{
+    (void)rest;
+    queue_next_graceful();
+    return STATUS_OK;
+}
+
+static status_t command_gap(const char *rest)
+{
+    (void)rest;
+    engine_set_gap(!engine_gap());
+    return STATUS_OK;
+}
+
+static status_t command_debug(const char *rest)
+{
+    (void)rest;
+    debugging = !debugging;
+    if (debugging) {
+        timebase_start();
+    } else {
+        timebase_stop();
+    }
+    return STATUS_OK;
+}
+
+static status_t command_ramp(const char *rest)
+{
+    static const char range_flag[] FLASH = "0..1";
+    if (is_end(rest[0])) {
+        return STATUS_OK; /* neither 0 nor 1: no change (A-SYS-02) */
+    }
+    if (rest[0] < '0' || rest[0] > '9') {
+        return STATUS_SYNTAX;
+    }
+    if (rest[0] > '1' || !is_end(rest[1])) {
+        refused_range = range_flag;
+        return STATUS_RANGE;
+    }
+    session_set_linear(rest[0] == '1');
+    return STATUS_OK;
+}
+
+static status_t command_full_steps(const char *rest)
+{
+    (void)rest;
+    session_set_pulses(false);
+    return STATUS_OK;
+}
+
+static status_t command_pulses(const char *rest)
+{
+    (void)rest;
+    session_set_pulses(true);
+    return STATUS_OK;
+}
+
+static status_t command_toggle_steps(const char *rest)
+{
+    (void)rest;
+    session_set_pulses(!(session.flags & MOTION_PULSES));
+    return STATUS_OK;
+}
+
+static status_t command_later(const char *rest)
+{
+    (void)rest;
+    return STATUS_NOT_YET;
+}
+
+/* -- the table -------------------------------------------------------------------------------------------------------- */
+
+#define COMMAND(name, first, second, case_rule, argument, handler, form, help)                                         \
+    static const char form_##name[] FLASH = form;                                                                      \
+    static const char help_##name[] FLASH = help;
+#include "cli/commands.def"
+#undef COMMAND
+
+static const command_row_t rows[] FLASH = {
+#define COMMAND(name, first, second, case_rule, argument, handler, form, help)                                         \
+    {first, second, CASE_##case_rule, ARGUMENT_##argument, handler, form_##name, help_##name},
+#include "cli/commands.def"
+#undef COMMAND
+};
+enum { ROWS = sizeof rows / sizeof rows[0] };
+
+static char lower(char c)
+{
+    return c >= 'A' && c <= 'Z' ? (char)(c | 0x20) : c;
+}
+
+static status_t dispatch(const char *line)
+{
+    const char first = line[0];
+    const char second = line[1];
+    const char first_lower = lower(first);
+    bool letter_known = false;
+
+    for (uint8_t i = 0; i < ROWS; i++) {
+        const char row_first = (char)flash_u8(&rows[i].first);
+        if (row_first != first && row_first != first_lower) {
+            continue; /* most rows: nothing more is read of them */
+        }
+        command_row_t row;
+        FLASH_COPY(&row, &rows[i], sizeof row);
+        const bool exact = row.case_rule == CASE_EXACT;
+        if (exact && row.first != first) {
+            continue;
+        }
+        if (row.second != '\0' && row.second != (exact ? second : lower(second))) {
+            continue;
+        }
+        letter_known = true;
+        const char *rest = line + (row.second != '\0' ? 2 : 1);
+        if (row.argument == ARGUMENT_NONE && !is_end(*rest)) {
+            continue;
+        }
+        return row.handler(rest);
+    }
+    return letter_known ? STATUS_SYNTAX : STATUS_UNKNOWN_COMMAND;
+}
+
+void commands_init(void)
+{
+    session_init();
+    debugging = false;
+    characters_ahead = 0;
+}
+
+void commands_read_ahead(const char *line, uint8_t length)
+{
+    if (length == 0 || lower(line[0]) != 'm') {
+        characters_ahead = 0;
+        return;
+    }
+    if (characters_ahead == 0 || characters_ahead > length) {
+        motion_syntax_begin(&ahead, line[0], &session);
+        characters_ahead = 1;
+    }
+    while (characters_ahead < length) {
+        motion_syntax_take(&ahead, line[characters_ahead++]);
+    }
+}
+
+status_t commands_execute(const char *line, uint8_t length, const char **range)
+{
+    commands_read_ahead(line, length);
+    characters_ahead = 0;
+    refused_range = 0;
+    status_t status = STATUS_OK;
+    if (line[0] >= '0' && line[0] <= '9') {
+        status = STATUS_NOT_YET; /* a network address: TRM-006 */
+    } else if (!is_end(line[0])) {
+        if (line[0] == '$') {
+            queue_stop();
+        }
+        status = dispatch(line);
+    }
+    *range = refused_range;
+    return status;
+}
+
+bool commands_at_once(char character)
+{
+    if (character == '+') {
+        command_pulse_cw("");
+    } else if (character == '-') {
+        command_pulse_ccw("");
+    } else {
+        return false;
+    }
+    return true;
+}
+
+bool commands_next_help(uint8_t *row, const char **form, const char **help)
+{
+    for (uint8_t i = (uint8_t)(*row + 1); i < ROWS; i++) {
+        const char *text = flash_pointer(&rows[i].help);
+        if (flash_u8(text) != '\0') {
+            *row = i;
+            *form = flash_pointer(&rows[i].form);
+            *help = text;
+            return true;
+        }
+    }
+    return false;
+}
+
+bool commands_debugging(void)
+{
+    return debugging;
+}

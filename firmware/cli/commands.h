@@ -1,0 +1,33 @@
+/* The commands of the terminal: from a line to what it does, by the table commands.def.
+ *
+ * A space ends a command; what follows is ignored. Every line that begins with $ ends all activity first, as S, even if
+ * it is then refused (manual line 839).
+ * Context: main loop.
+ * Errors:  a status of base/status.def; then nothing has changed. With STATUS_RANGE, *range is the range, in flash.
+ * Tests:   test/host/test_commands.c */
+#ifndef CLI_COMMANDS_H
+#define CLI_COMMANDS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+#include "base/status.h"
+
+void commands_init(void);
+
+/* Reads ahead in the line that is being typed, so that little is left to do at its end. Optional; call it after each
+ * change of the line. */
+void commands_read_ahead(const char *line, uint8_t length);
+
+/* Executes a line; a blank one, or one that begins with a space, does nothing. */
+status_t commands_execute(const char *line, uint8_t length, const char **range);
+
+/* + and -: whether this character, first on a line, is a command of its own. Executes it if so. */
+bool commands_at_once(char character);
+
+/* The row of commands.def after *row that has a help line: false at the end. Start with *row = COMMANDS_BEFORE_FIRST. */
+#define COMMANDS_BEFORE_FIRST 0xFFu
+bool commands_next_help(uint8_t *row, const char **form, const char **help);
+
+bool commands_debugging(void);
+
+#endif

@@ -1,0 +1,52 @@
+#include "cli/line.h"
+
+enum { BACKSPACE = 0x08, LINE_FEED = 0x0A, CARRIAGE_RETURN = 0x0D, ESCAPE = 0x1B, SPACE = 0x20, DELETE = 0x7F };
+
+void line_reset(line_t *line)
+{
+    line->length = 0;
+    line->text[0] = '\0';
+    line->status = STATUS_OK;
+}
+
+static line_event_t append(line_t *line, char character)
+{
+    if (line->length == LINE_CHARACTERS) {
+        if (line->status == STATUS_OK) {
+            line->status = STATUS_LINE_TOO_LONG;
+        }
+        return LINE_UNCHANGED;
+    }
+    line->text[line->length++] = character;
+    line->text[line->length] = '\0';
+    return LINE_EDITED;
+}
+
+line_event_t line_take(line_t *line, uint8_t byte)
+{
+    const bool after_return = line->after_return;
+    line->after_return = byte == CARRIAGE_RETURN;
+
+    if (byte >= SPACE && byte != DELETE) {
+        return append(line, (char)byte);
+    }
+    if (byte == CARRIAGE_RETURN || (byte == LINE_FEED && !after_return)) {
+        return LINE_ENDED;
+    }
+    if ((byte == BACKSPACE || byte == DELETE) && line->length > 0) {
+        line->text[--line->length] = '\0';
+        return LINE_EDITED;
+    }
+    if (byte == ESCAPE && !line_is_blank(line)) {
+        line_reset(line);
+        return LINE_CLEARED;
+    }
+    return LINE_UNCHANGED;
+}
+
+line_event_t line_damage(line_t *line)
+{
+    line->after_return = false;
+    line->status = STATUS_LINE_DAMAGED;
+    return LINE_UNCHANGED;
+}

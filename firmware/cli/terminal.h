@@ -1,0 +1,21 @@
+/* The terminal: what is typed becomes lines and commands; echo, answers and the prompt go back.
+ *
+ * Input comes first. Every line is executed as soon as it is complete, whatever the output is doing. While a display is
+ * printed, or when answers come faster than the port sends them, echo and answers are held back: afterwards one prompt
+ * follows, with the first error since, and what is already typed of the next line. So a flood of lines at the port's
+ * own rate is executed completely, and its echo is thinned out by whole lines.
+ * + and - as the first character of a line act at once; they are not echoed.
+ * Context: main loop.
+ * Errors:  answered as `?<number> <words>`.
+ * Tests:   test/host/test_terminal.c
+ * Source:  manual lines 121, 177, 239; decisions on echo and refused lines. */
+#ifndef CLI_TERMINAL_H
+#define CLI_TERMINAL_H
+
+#include <stdbool.h>
+
+void terminal_init(void); /* prints the version line and the first prompt; the port is ready */
+
+bool terminal_poll(void); /* takes at most one byte in, sends what is owed; true if it did anything */
+
+#endif

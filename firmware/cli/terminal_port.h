@@ -1,0 +1,21 @@
+/* The serial port that the terminal uses; implemented by hal/usart.c.
+ *
+ * Units:   bytes. Context: main loop.
+ * Errors:  a lost or damaged byte is read as TERMINAL_PORT_DAMAGED in its place.
+ * Tests:   test/host/test_terminal.c with test/host/fakes/terminal_port_fake.c; test/image. */
+#ifndef CLI_TERMINAL_PORT_H
+#define CLI_TERMINAL_PORT_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define TERMINAL_PORT_DAMAGED 0xFFu
+
+void terminal_port_init(uint32_t baud); /* 300..2,000,000; the nearest divisor is taken */
+
+bool terminal_port_get(uint8_t *byte); /* false: nothing has arrived */
+
+uint8_t terminal_port_free(void);      /* how many bytes terminal_port_put() would take now, 0..63 */
+void terminal_port_put(uint8_t byte);  /* only while terminal_port_free() is not 0 */
+
+#endif

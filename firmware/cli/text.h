@@ -1,0 +1,17 @@
+/* Text to the terminal's port. Whoever calls these has asked terminal_port_free() first.
+ *
+ * Context: main loop. Errors: none. Tests: through test_display.c and test_terminal.c */
+#ifndef CLI_TEXT_H
+#define CLI_TEXT_H
+
+#include <stdint.h>
+#include "motion/command.h"
+
+void text_put(const char *text);       /* in RAM */
+void text_put_flash(const char *text); /* in flash */
+void text_put_u32(uint32_t value);
+void text_put_i32(int32_t value);
+void text_put_accel(accel_code_t code); /* two decimals below 100, none from 100 */
+void text_new_line(void);               /* CR LF */
+
+#endif

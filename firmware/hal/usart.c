@@ -1,0 +1,49 @@
+/* USART0 as the terminal's port: rings between the main loop and the interrupts of usart_isr.S.
+ * Source: ATmega328P datasheet DS40002061, section 20. */
+#include <avr/io.h>
+#include "base/atomic.h"
+#include "cli/terminal_port.h"
+#include "hal/baud.h"
+#include "hal/usart.h"
+
+_Static_assert(TERMINAL_PORT_DAMAGED == USART_DAMAGED, "the terminal knows a damaged byte by this value");
+
+volatile uint8_t usart_rx_bytes[USART_RX_BYTES];
+volatile uint8_t usart_tx_bytes[USART_TX_BYTES];
+volatile uint8_t usart_rx_head, usart_rx_tail, usart_tx_head, usart_tx_tail;
+
+void terminal_port_init(uint32_t baud)
+{
+    const baud_divisor_t divisor = baud_divisor(baud);
+    UCSR0A = divisor.u2x ? (uint8_t)_BV(U2X0) : 0;
+    UBRR0 = divisor.ubrr;
+    UCSR0C = _BV(UCSZ01) | _BV(UCSZ00); /* 8 data bits, no parity, 1 stop bit */
+    UCSR0B = _BV(RXCIE0) | _BV(RXEN0) | _BV(TXEN0);
+}
+
+bool terminal_port_get(uint8_t *byte)
+{
+    const uint8_t tail = usart_rx_tail;
+    if (tail == usart_rx_head) {
+        return false;
+    }
+    *byte = usart_rx_bytes[tail];
+    usart_rx_tail = (uint8_t)((tail + 1) & (USART_RX_BYTES - 1));
+    return true;
+}
+
+uint8_t terminal_port_free(void)
+{
+    return (uint8_t)((usart_tx_tail - usart_tx_head - 1) & (USART_TX_BYTES - 1));
+}
+
+void terminal_port_put(uint8_t byte)
+{
+    const uint8_t head = usart_tx_head;
+    usart_tx_bytes[head] = byte;
+    usart_tx_head = (uint8_t)((head + 1) & (USART_TX_BYTES - 1));
+    /* The interrupts write UCSR0B too: 7 cycles masked. */
+    const uint8_t state = atomic_begin();
+    UCSR0B |= _BV(UDRIE0);
+    atomic_end(state);
+}

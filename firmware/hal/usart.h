@@ -1,0 +1,22 @@
+/* What usart.c and usart_isr.S share. Sizes are powers of two: an index wraps by masking. */
+#ifndef HAL_USART_H
+#define HAL_USART_H
+
+#define USART_RX_BYTES 128
+#define USART_TX_BYTES 64
+
+/* Stands in the receive ring for what was lost: a byte with a framing error, or bytes before an overrun. It is not a
+ * character of any command; in binary data a checksum tells it from a genuine 0xFF. */
+#define USART_DAMAGED 0xFF
+
+#ifndef __ASSEMBLER__
+#include <stdint.h>
+
+/* Rings: the interrupt writes rx_head and tx_tail, the main loop rx_tail and tx_head. Head is where the next byte goes,
+ * tail where the next one is taken; equal means empty, one place stays free. */
+extern volatile uint8_t usart_rx_bytes[USART_RX_BYTES];
+extern volatile uint8_t usart_tx_bytes[USART_TX_BYTES];
+extern volatile uint8_t usart_rx_head, usart_rx_tail, usart_tx_head, usart_tx_tail;
+#endif
+
+#endif

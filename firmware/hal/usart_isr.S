@@ -1,0 +1,132 @@
+; The two interrupts of USART0.
+;
+; A step interrupt may be due every 32 cycles, so these mask only themselves (RXCIE0 or UDRIE0), allow interrupts at
+; once and do their work interruptible. Both flags would otherwise call the interrupt again at once: they stay raised
+; until the data register was read or written.
+;
+;   flag raised to `sei`     18 cycles with interrupts masked (entry 4, vector jump 3, 11 here)
+;   `cli` to end of `reti`   15 cycles masked
+;   whole run, receive       85 cycles: a good byte; 131 an overrun; transmit 74 (58 the last byte)
+;
+; UCSR0B is read, changed and written only while interrupts are masked, here as in usart.c.
+; Shared: usart.h says who writes which index.
+; Source: ATmega328P datasheet DS40002061, 20.7.3 (receiver error flags: read UCSR0A before UDR0), 20.11.3.
+
+#include <avr/io.h>
+#include "hal/usart.h"
+
+#define ADDRESS(name) _SFR_MEM_ADDR(name)
+#define IO_SREG _SFR_IO_ADDR(SREG)
+
+.section .text
+
+.macro ENTER enable_bit         ; cycles since the flag was raised
+    push r24                    ; 9
+    in   r24, IO_SREG           ; 10
+    push r24                    ; 12
+    lds  r24, ADDRESS(UCSR0B)   ; 14
+    andi r24, 0xFF & ~(1 << \enable_bit) ; 15
+    sts  ADDRESS(UCSR0B), r24   ; 17
+    sei                         ; 18
+    push r25
+    push r30
+    push r31
+.endm
+
+.macro LEAVE_ENABLED enable_bit ; cycles masked
+    pop  r31
+    pop  r30
+    pop  r25
+    cli
+    lds  r24, ADDRESS(UCSR0B)   ; 2
+    ori  r24, (1 << \enable_bit) ; 3
+    sts  ADDRESS(UCSR0B), r24   ; 5
+    pop  r24                    ; 7
+    out  IO_SREG, r24           ; 8
+    pop  r24                    ; 10
+    reti                        ; 14
+.endm
+
+; -- receive ----------------------------------------------------------------------------------------------------------
+
+.global USART_RX_vect
+USART_RX_vect:
+    ENTER RXCIE0
+    lds  r25, ADDRESS(UCSR0A)
+    lds  r24, ADDRESS(UDR0)
+    andi r25, (1 << FE0) | (1 << DOR0)
+    brne damaged
+store_last:
+    rcall store
+    LEAVE_ENABLED RXCIE0
+
+; Bytes were lost before this one (overrun), or this one is not what was sent (framing error). A byte with a framing
+; error is not stored itself: it might read as the end of a line and set the rest of the line free to be executed.
+damaged:
+    bst  r25, FE0
+    push r24
+    ldi  r24, USART_DAMAGED
+    rcall store
+    pop  r24
+    brtc store_last
+    LEAVE_ENABLED RXCIE0
+
+; Appends r24. In a full ring the newest byte becomes USART_DAMAGED: the main loop cannot be reading that one.
+store:
+    lds  r30, usart_rx_head
+    mov  r25, r30
+    inc  r25
+    andi r25, USART_RX_BYTES - 1
+    lds  r31, usart_rx_tail
+    cp   r25, r31
+    breq full
+    ldi  r31, 0
+    subi r30, lo8(-(usart_rx_bytes))
+    sbci r31, hi8(-(usart_rx_bytes))
+    st   Z, r24
+    sts  usart_rx_head, r25
+    ldi  r24, 1
+    sts  wake_flag, r24
+    ret
+full:
+    dec  r30
+    andi r30, USART_RX_BYTES - 1
+    ldi  r31, 0
+    subi r30, lo8(-(usart_rx_bytes))
+    sbci r31, hi8(-(usart_rx_bytes))
+    ldi  r24, USART_DAMAGED
+    st   Z, r24
+    ret
+
+; -- transmit ---------------------------------------------------------------------------------------------------------
+
+; The data register is empty. With the last byte the interrupt stays masked until the main loop puts another one.
+.global USART_UDRE_vect
+USART_UDRE_vect:
+    ENTER UDRIE0
+    lds  r25, usart_tx_tail
+    lds  r24, usart_tx_head
+    cp   r24, r25
+    breq idle
+    mov  r30, r25
+    ldi  r31, 0
+    subi r30, lo8(-(usart_tx_bytes))
+    sbci r31, hi8(-(usart_tx_bytes))
+    ld   r30, Z
+    sts  ADDRESS(UDR0), r30
+    inc  r25
+    andi r25, USART_TX_BYTES - 1
+    sts  usart_tx_tail, r25
+    ldi  r30, 1
+    sts  wake_flag, r30
+    cp   r24, r25
+    breq idle
+    LEAVE_ENABLED UDRIE0
+idle:
+    pop  r31
+    pop  r30
+    pop  r25
+    pop  r24
+    out  IO_SREG, r24           ; interrupts masked again: SREG as it was at the entry
+    pop  r24
+    reti

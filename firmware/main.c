@@ -1,0 +1,32 @@
+/* Boot, then the polled loop: nothing else. */
+#include "base/atomic.h"
+#include "base/wake.h"
+#include "cli/commands.h"
+#include "cli/terminal.h"
+#include "cli/terminal_port.h"
+#include "motion/engine.h"
+#include "pins_port.h"
+#include "queue/queue.h"
+#include "settings.h"
+
+int main(void)
+{
+    pins_init();
+    engine_init();
+    queue_init();
+    commands_init();
+    terminal_port_init(settings.hw_baud);
+    terminal_init();
+    atomic_enable();
+
+    for (;;) {
+        /* Cleared before the polls: what an interrupt leaves to do meanwhile is seen in this round or the next. */
+        wake_flag = 0;
+        bool worked = engine_poll();
+        worked |= terminal_poll();
+        worked |= queue_poll();
+        if (!worked) {
+            wake_sleep();
+        }
+    }
+}
