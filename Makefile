@@ -5,100 +5,297 @@
 BUILD ?= build
 # More macros for the firmware, e.g. DEFS='-DSETTINGS_USTEP=3'. A change rebuilds what it touches.
 DEFS ?=
-# Budgets in bytes; what exceeds one fails the build. RAM is .data, .bss and the segment ring, without the stack.
+# Budgets in bytes; what exceeds one fails the build. RAM is what is taken before the first call, the stack apart.
 FLASH_BUDGET := 26624
 RAM_BUDGET := 1400
+# How many jobs build and test side by side.
+JOBS ?= $(shell nproc)
+# Flashing: the serial port; its speed is found out unless given; the programmer for flash-isp.
+PORT ?= /dev/ttyUSB0
+BAUD ?= 115200 57600
+PROGRAMMER ?= usbasp
 
 # avr-gcc 5.4 is the reference: unpacked by tools/setup.sh where the system's own is another one.
 AVR ?= $(if $(wildcard .tools/avr-5.4/ready),.tools/avr-5.4/usr/bin/avr-,avr-)
+NEWER_AVR ?= $(if $(wildcard .tools/avr-14.2/ready),.tools/avr-14.2/usr/bin/avr-,$(if \
+    $(wildcard /usr/lib/gcc/avr/14.*),avr-))
 HOST_CC ?= gcc
 PYTHON ?= python3
-UNITY ?= $(firstword $(wildcard .tools/unity /usr/share/cmock/vendor/unity/src))
+UNITY ?= $(firstword $(wildcard .tools/unity /usr/share/cmock/vendor/unity/src) .tools/unity)
 
 # -- the firmware's sources ------------------------------------------------------------------------------------------
 
-FIRMWARE_SRCS :=
+FIRMWARE_SRCS := \
+    firmware/main.c \
+    firmware/settings.c \
+    firmware/base/number.c \
+    firmware/base/status.c \
+    firmware/motion/ramp.c \
+    firmware/queue/queue.c \
+    firmware/queue/session.c \
+    firmware/cli/commands.c \
+    firmware/cli/display.c \
+    firmware/cli/line.c \
+    firmware/cli/motion_syntax.c \
+    firmware/cli/terminal.c \
+    firmware/cli/text.c \
+    firmware/hal/sleep.c \
+    firmware/hal/step_isr.S \
+    firmware/hal/timebase.c \
+    firmware/hal/usart.c \
+    firmware/hal/usart_isr.S
 
 # -- the tests -------------------------------------------------------------------------------------------------------
-# Host tests: one binary a module, test/host/<name>.c with the sources that <name>_SRCS lists.
+# Host tests: test/host/<name>.c, one binary a module, with the sources that <name>_SRCS lists.
 
 HOST_TESTS :=
 
-# Whole-image tests: test/image/<name>.c with the board library; they load build/sac.elf.
+# Arithmetic that is tested on the AVR as well: the same source, compiled by avr-gcc, run on the simulated board.
+AVR_TESTS :=
 
+# Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
 IMAGE_TESTS :=
-# Helpers that every whole-image test is linked with.
+# What every whole-image test is linked with.
 IMAGE_COMMON_SRCS :=
 
-# The board lists its sources (BOARD_SRCS) and its own tests (BOARD_TESTS, test/board/<name>.c) itself.
--include test/board/board.mk test/board/models.mk
+# Checks of tools/ that count as one test each.
+CHECKS := \
+    includes='$(PYTHON) tools/check_includes.py' \
+    pins='$(PYTHON) tools/check_pins.py' \
+    budgets='$(MAKE) -s --no-print-directory BUILD=$(BUILD) budgets'
+
+# The board, its models and the simulator program list their own sources.
+-include test/board/board.mk
+-include test/board/models.mk
+-include tools/sacsim/sacsim.mk
 
 # -- firmware --------------------------------------------------------------------------------------------------------
 
 AVR_MCU := -mmcu=atmega328p
-AVR_WARNINGS := -Wall -Wextra -Wconversion -Wshadow -Wlogical-op -Wstrict-prototypes -Werror
+AVR_WARNINGS := -Wall -Wextra -Wconversion -Wshadow -Wlogical-op -Wstrict-prototypes -Wstack-usage=128 -Werror
 AVR_CFLAGS := $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 -Os -g -ffunction-sections -fdata-sections -fshort-enums \
-    -Ifirmware $(AVR_WARNINGS) -Wstack-usage=128 -fstack-usage
-# The segment ring stands alone at the start of RAM, page-aligned, so that the step interrupt addresses it by one byte.
-AVR_LDFLAGS := $(AVR_MCU) -Wl,--gc-sections -Wl,--section-start=.segments=0x800100 -Wl,-Tdata=0x800200
+    -fstack-usage -Ifirmware $(AVR_WARNINGS)
+# The segment ring stands alone in the first 256 bytes of RAM, so that the step interrupt addresses it with one byte.
+AVR_LDFLAGS := $(AVR_MCU) -Wl,--gc-sections -mrelax -Wl,--section-start=.segments=0x800100 -Wl,-Tdata=0x800200
 
 FIRMWARE_OBJS := $(FIRMWARE_SRCS:firmware/%=$(BUILD)/firmware/%.o)
 
 .PHONY: firmware
-firmware: $(BUILD)/sac.hex ## build/sac.elf and build/sac.hex, budgets checked
+firmware: $(BUILD)/sac.hex budgets ## build/sac.elf and build/sac.hex; budgets of flash, RAM and stack
 
-# Rewritten only when the flags change; every object depends on it.
+# Rewritten only when it changes; every object depends on it.
 $(BUILD)/firmware/flags: FORCE
 	@mkdir -p $(@D)
-	@echo '$(AVR) $(AVR_CFLAGS) $(AVR_LDFLAGS) $(DEFS)' | cmp -s - $@ || \
-	    echo '$(AVR) $(AVR_CFLAGS) $(AVR_LDFLAGS) $(DEFS)' >$@
+	@echo '$(AVR) $(AVR_CFLAGS) $(AVR_LDFLAGS) $(DEFS) $(FIRMWARE_SRCS)' >$@.new
+	@cmp -s $@.new $@ || cp $@.new $@
 
 $(BUILD)/firmware/%.o: firmware/% $(BUILD)/firmware/flags
 	@mkdir -p $(@D)
 	$(AVR)gcc $(AVR_CFLAGS) $(DEFS) -MMD -MP -c -o $@ $<
 
-$(BUILD)/sac.elf: $(FIRMWARE_OBJS)
-	$(AVR)gcc $(AVR_LDFLAGS) -Wl,-Map=$(BUILD)/sac.map -o $@ $^
+$(BUILD)/sac.elf: $(FIRMWARE_OBJS) $(BUILD)/firmware/flags
+	$(AVR)gcc $(AVR_LDFLAGS) -Wl,-Map=$(BUILD)/sac.map -o $@ $(FIRMWARE_OBJS)
 
 $(BUILD)/sac.hex: $(BUILD)/sac.elf
-	$(AVR)objcopy -O ihex -R .eeprom -R .segments $< $@
+	$(AVR)objcopy -O ihex -j .text -j .data $< $@
+
+.PHONY: budgets
+budgets: $(BUILD)/sac.elf
+	@$(PYTHON) tools/check_size.py $< --size $(AVR)size --flash-budget $(FLASH_BUDGET) --ram-budget $(RAM_BUDGET)
+	@$(PYTHON) tools/check_stack.py $< --su $(BUILD)/firmware --prefix $(AVR)
 
 -include $(FIRMWARE_OBJS:.o=.d)
 
+.PHONY: newer
+newer: ## the same sources with the newer avr-gcc (14.2): no warning, and the budgets hold
+ifeq ($(NEWER_AVR),)
+	@echo 'newer: skipped, avr-gcc 14 is not here; ./sac newer fetches it'
+else
+	@$(MAKE) -s --no-print-directory AVR=$(NEWER_AVR) BUILD=$(BUILD)/newer firmware
+	@echo "newer: $$($(NEWER_AVR)gcc -dumpversion) builds all sources without a warning"
+endif
+
+# -- the board and what runs on it -----------------------------------------------------------------------------------
+
+HOST_WARNINGS := -Wall -Wextra -Wconversion -Wshadow -Wstrict-prototypes -Werror
+HOST_CFLAGS := -std=gnu11 -g $(HOST_WARNINGS)
+HOST_HEADERS := $(wildcard firmware/*.h firmware/*/*.h firmware/*/*.def test/*/*.h test/*/*/*.h tools/*/*.h)
+SANITIZE := -fsanitize=address,undefined -fno-sanitize-recover=all
+UNITY_FLAGS := -DUNITY_INCLUDE_DOUBLE -DUNITY_SUPPORT_64
+BOARD_OBJS := $(BOARD_SRCS:%.c=$(BUILD)/%.o)
+BOARD_LIB := $(BUILD)/libboard.a
+
+$(BOARD_OBJS): $(BUILD)/%.o: %.c $(HOST_HEADERS) Makefile
+	@mkdir -p $(@D)
+	$(HOST_CC) $(HOST_CFLAGS) -O2 $(BOARD_CFLAGS) -Itest/board -c -o $@ $<
+
+$(BOARD_LIB): $(BOARD_OBJS)
+	@rm -f $@
+	ar rcs $@ $^
+
+SACSIM_OBJS := $(SACSIM_SRCS:%.c=$(BUILD)/%.o)
+
+$(SACSIM_OBJS): $(BUILD)/%.o: %.c $(HOST_HEADERS) Makefile
+	@mkdir -p $(@D)
+	$(HOST_CC) $(HOST_CFLAGS) -O2 $(SACSIM_CPPFLAGS) -c -o $@ $<
+
+$(BUILD)/sacsim: $(SACSIM_OBJS) $(BOARD_LIB)
+	$(HOST_CC) $(BOARD_LDFLAGS) -o $@ $^ $(BOARD_LIBS) $(SACSIM_LDLIBS)
+
+.PHONY: sim
+sim: $(BUILD)/sacsim $(BUILD)/sac.elf ## type at a simulated Nano; SIM='--help' lists its options
+	@$(BUILD)/sacsim $(SIM) $(BUILD)/sac.elf
+
+$(BUILD)/bench: test/bench/bench.c $(BOARD_LIB) $(HOST_HEADERS)
+	$(HOST_CC) $(HOST_CFLAGS) -O2 -Itest/board -Ifirmware $(BOARD_LDFLAGS) -o $@ $(filter %.c %.a,$^) $(BOARD_LIBS) -lm
+
+.PHONY: bench
+bench: $(BUILD)/bench $(BUILD)/sac.elf ## measure the image on the board; writes docs/benchmark.md
+	@$(BUILD)/bench $(BUILD)/sac.elf
+
 # -- tests -----------------------------------------------------------------------------------------------------------
 
-HOST_WARNINGS := -Wall -Wextra -Wconversion -Wshadow -Werror
-HOST_CFLAGS := -std=gnu11 -O1 -g $(HOST_WARNINGS)
-SANITIZE := -fsanitize=address,undefined -fno-sanitize-recover=all
-TEST_INCLUDES := -Ifirmware -Itest -I$(UNITY)
-TEST_HEADERS := $(wildcard firmware/*.h firmware/*/*.h firmware/*/*.def test/*/*.h)
+TEST_INCLUDES := -I$(UNITY) -Itest -Ifirmware -Itest/host -Itest/host/fakes
 
-.PHONY: test-host
-test-host: $(HOST_TESTS:%=$(BUILD)/host/%) ## the pure modules on this machine, with the sanitizers
-	@for t in $^; do echo $$t; $$t || exit 1; done
+HOST_BINS := $(HOST_TESTS:%=$(BUILD)/host/%)
+AVR_IMAGES := $(AVR_TESTS:%=$(BUILD)/avr/%.elf)
+BOARD_BINS := $(BOARD_TESTS:%=$(BUILD)/board/%)
+BOARD_IMAGES := $(BOARD_PROGRAMS:%=$(BUILD)/board/programs/%.elf)
+IMAGE_BINS := $(IMAGE_TESTS:%=$(BUILD)/image/%)
+RUN_TESTS := $(PYTHON) tools/run_tests.py --jobs $(JOBS)
 
-$(BUILD)/unity.o $(BUILD)/unity-sanitized.o: $(UNITY)/unity.c
+$(BUILD)/unity.o: $(UNITY)/unity.c
 	@mkdir -p $(@D)
-	$(HOST_CC) -O1 -g $(if $(findstring sanitized,$@),$(SANITIZE)) -c -o $@ $<
+	$(HOST_CC) -O2 -g $(UNITY_FLAGS) -c -o $@ $<
+
+$(BUILD)/unity-sanitized.o: $(UNITY)/unity.c
+	@mkdir -p $(@D)
+	$(HOST_CC) -O1 -g $(UNITY_FLAGS) $(SANITIZE) -c -o $@ $<
 
 .SECONDEXPANSION:
-$(BUILD)/host/%: test/host/%.c $$($$*_SRCS) $(BUILD)/unity-sanitized.o $(TEST_HEADERS)
+$(HOST_BINS): $(BUILD)/host/%: test/host/%.c $$($$*_SRCS) $(BUILD)/unity-sanitized.o $(HOST_HEADERS) Makefile
 	@mkdir -p $(@D)
-	$(HOST_CC) $(HOST_CFLAGS) $(SANITIZE) $(TEST_INCLUDES) -o $@ $(filter %.c %.o,$^) -lm
+	$(HOST_CC) $(HOST_CFLAGS) -O1 $(UNITY_FLAGS) $(SANITIZE) $(TEST_INCLUDES) -o $@ $(filter %.c %.o,$^) -lm
 
-# -- the rest --------------------------------------------------------------------------------------------------------
+# Unity reports over the serial port; the runner passes on what it says.
+$(AVR_IMAGES): $(BUILD)/avr/%.elf: test/host/%.c $$($$*_SRCS) test/avr/report.c $(HOST_HEADERS) Makefile
+	@mkdir -p $(@D)
+	$(AVR)gcc $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 -Os -g -fshort-enums -ffunction-sections -fdata-sections \
+	    -Wl,--gc-sections -include test/avr/report.h -DUNITY_EXCLUDE_FLOAT $(TEST_INCLUDES) -o $@ \
+	    $(filter %.c,$^) $(UNITY)/unity.c
+
+$(BUILD)/avr/run: test/avr/run.c $(BOARD_LIB) $(HOST_HEADERS)
+	@mkdir -p $(@D)
+	$(HOST_CC) $(HOST_CFLAGS) -O2 -Itest/board $(BOARD_LDFLAGS) -o $@ $(filter %.c %.a,$^) $(BOARD_LIBS)
+
+$(BOARD_IMAGES): $(BUILD)/board/programs/%.elf: $$(wildcard test/board/programs/$$*.[cS])
+	@mkdir -p $(@D)
+	$(AVR)gcc $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 -Os -g -Wall -Wextra -Werror -o $@ $<
+
+$(BOARD_BINS): $(BUILD)/board/%: test/board/%.c $(BUILD)/unity.o $(BOARD_LIB) $(HOST_HEADERS)
+	@mkdir -p $(@D)
+	$(HOST_CC) $(HOST_CFLAGS) -O2 $(UNITY_FLAGS) $(TEST_INCLUDES) -Itest/board $(BOARD_LDFLAGS) -o $@ \
+	    $(filter %.c %.o %.a,$^) $(BOARD_LIBS) -lm
+
+$(IMAGE_BINS): $(BUILD)/image/%: test/image/%.c $(IMAGE_COMMON_SRCS) $$($$*_SRCS) $(BUILD)/unity.o $(BOARD_LIB) \
+    $(HOST_HEADERS)
+	@mkdir -p $(@D)
+	$(HOST_CC) $(HOST_CFLAGS) -O2 $(UNITY_FLAGS) $(TEST_INCLUDES) -Itest/board $(BOARD_LDFLAGS) -o $@ \
+	    $(filter %.c %.o %.a,$^) $(BOARD_LIBS) -lm
+
+HOST_PARTS := $(HOST_BINS)
+BOARD_PARTS := $(BOARD_BINS) $(BOARD_IMAGES)
+IMAGE_PARTS := $(IMAGE_BINS) $(BUILD)/sac.hex
+AVR_PARTS := $(if $(AVR_TESTS),$(AVR_IMAGES) $(BUILD)/avr/run)
+
+.PHONY: test-parts
+test-parts: $(HOST_PARTS) $(BOARD_PARTS) $(IMAGE_PARTS) $(AVR_PARTS) $(if $(SACSIM_SRCS),$(BUILD)/sacsim)
+
+# What cannot be built counts as a failed test, so building goes on after an error and the runner has the last word.
+build_parts = $(MAKE) -s -k -j$(JOBS) --no-print-directory $(1) || true
+unity_runs = $(foreach run,$(1),--unity $(run))
+
+.PHONY: test
+test: ## everything: builds, runs and sums up all tests and checks
+	@$(call build_parts,test-parts)
+	@$(RUN_TESTS) $(call unity_runs,$(IMAGE_BINS) $(BOARD_BINS) $(HOST_BINS)) \
+	    $(foreach run,$(AVR_TESTS),--unity '$(BUILD)/avr/run $(BUILD)/avr/$(run).elf') \
+	    $(foreach check,$(CHECKS),--check $(check)) --check newer='$(MAKE) -s --no-print-directory newer' \
+	    $(if $(CI),--check crosscheck='tools/crosscheck/run.sh') \
+	    --last trace='$(PYTHON) tools/trace.py --quiet'
+
+.PHONY: test-host
+test-host: ## the pure modules on this machine, with the sanitizers, and their arithmetic on the AVR
+	@$(call build_parts,$(HOST_PARTS) $(AVR_PARTS))
+	@$(RUN_TESTS) --results $(BUILD)/test-host $(call unity_runs,$(HOST_BINS)) \
+	    $(foreach run,$(AVR_TESTS),--unity '$(BUILD)/avr/run $(BUILD)/avr/$(run).elf')
+
+.PHONY: test-board
+test-board: ## the simulated board against the datasheet
+	@$(call build_parts,$(BOARD_PARTS))
+	@$(RUN_TESTS) --results $(BUILD)/test-board $(call unity_runs,$(BOARD_BINS))
+
+.PHONY: test-image
+test-image: ## the whole image on the simulated board
+	@$(call build_parts,$(IMAGE_PARTS))
+	@$(RUN_TESTS) --results $(BUILD)/test-image $(call unity_runs,$(IMAGE_BINS))
+
+.PHONY: trace
+trace: ## which requirement which passing test shows (of the last `make test`); raises docs/trace-count
+	@$(PYTHON) tools/trace.py --raise
+
+.PHONY: crosscheck
+crosscheck: ## the image in avr8js: the edges of clk compared with the board's (needs Node 20)
+	@tools/crosscheck/run.sh
+
+# -- hardware --------------------------------------------------------------------------------------------------------
+
+# A Nano's bootloader listens at 115200 bits/s, older ones at 57600: whichever answers.
+.PHONY: flash
+flash: $(BUILD)/sac.hex ## flash a Nano: PORT=/dev/ttyUSB0, if need be BAUD=57600 or 115200
+	@for baud in $(BAUD); do \
+	    echo "avrdude at $$baud bits/s"; \
+	    avrdude -p atmega328p -c arduino -P $(PORT) -b $$baud -D -U flash:w:$<:i && exit 0; \
+	done; echo "no bootloader answered on $(PORT)" >&2; exit 1
+
+# The fuses (datasheet DS40002061, tables 27-5 to 27-7; 0 is programmed):
+#   low  0xF7  CKDIV8 1: undivided; CKOUT 1: off; SUT 11 and CKSEL 0111: full-swing crystal oscillator, 16K clocks and
+#              65 ms of start-up (table 9-5): the safest for a crystal, with brown-out detection or without
+#   high 0xD1  RSTDISBL 1: reset pin works; DWEN 1: off; SPIEN 0: ISP works; WDTON 1: the firmware starts the watchdog;
+#              EESAVE 0: a chip erase keeps the EEPROM; BOOTSZ 00, BOOTRST 1: no bootloader, start at 0
+#   ext  0xFC  BODLEVEL 100: brown-out detection at 4.3 V, the only level above the 3.8 V that 16 MHz need (figure 28-1)
+# They are written first: the chip erase that comes with the flash would take the EEPROM along without EESAVE.
+FUSES := -U lfuse:w:0xF7:m -U hfuse:w:0xD1:m -U efuse:w:0xFC:m
+
+.PHONY: flash-isp
+flash-isp: $(BUILD)/sac.hex ## flash and set the fuses with an ISP programmer: PROGRAMMER=usbasp
+	avrdude -p atmega328p -c $(PROGRAMMER) $(FUSES)
+	avrdude -p atmega328p -c $(PROGRAMMER) -U flash:w:$<:i
+
+# -- housekeeping ----------------------------------------------------------------------------------------------------
+
+C_FILES = $(shell git ls-files '*.c' '*.h')
+
+.PHONY: format
+format: ## clang-format on all C files that git knows
+	clang-format -i $(C_FILES)
+
+.PHONY: lint
+lint: ## the checks alone: includes, pin table, budgets; shell scripts where shellcheck is installed
+	@$(RUN_TESTS) --results $(BUILD)/lint $(foreach check,$(CHECKS),--check $(check))
+	@if command -v shellcheck >/dev/null; then shellcheck sac tools/setup.sh .ci/run; fi
 
 .PHONY: setup
 setup: ## install what is missing
 	@sh tools/setup.sh build
 
 .PHONY: clean
-clean: ## remove what was built
+clean: ## remove what was built; what setup fetched stays in .tools/
 	rm -rf $(BUILD)
 
 .PHONY: help
 help: ## this list
-	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | awk -F '\t' '{ printf "  %-12s %s\n", $$1, $$2 }'
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | awk -F '\t' '{ printf "  %-11s %s\n", $$1, $$2 }'
 
 .PHONY: FORCE
 FORCE:

@@ -80,6 +80,7 @@ private_apt_update() { # RELEASE
     [ -e "$keyring" ] || fail "Debian's archive keyring is missing: apt-get install debian-archive-keyring"
     mkdir -p "$private/none" "$private/lists/partial" "$private/cache/archives/partial"
     # Security mirrors hold no whole release; of the others the first that has this one is taken.
+    # shellcheck disable=SC2016 # apt's own placeholder
     for site in $(apt-get indextargets --format '$(SITE)' | grep -v security | sort -u); do
         echo "deb [signed-by=$keyring] $site $1 main" >"$private/sources.list"
         if private_apt_get "$1" -o APT::Update::Error-Mode=any update >"$private/log" 2>&1; then
@@ -120,15 +121,16 @@ avr_version() { avr-gcc -dumpversion 2>/dev/null || echo none; }
 wrap_programs() { # FOLDER
     (
         cd "$1"
-        loader=$(find . -name 'ld-linux*.so.*' | head -n 1)
+        loader=$(find usr -name 'ld-linux*.so.*' | head -n 1)
         find usr/bin usr/lib/avr/bin usr/lib/gcc/avr -type f -perm -u+x ! -name '*.so*' | while read -r program; do
             [ "$(head -c 4 "$program" | tail -c 3)" = ELF ] || continue
             mv "$program" "$program.elf"
             up=$(dirname "$program" | sed 's,[^/]*,..,g')
             cat >"$program" <<END
 #!/bin/sh
-here=\${0%/*}
-exec "\$here/$up/$loader" --library-path "\$here/$up/${loader%/*}" --argv0 "\$0" "\$0.elf" "\$@"
+self=\$(readlink -f "\$0")
+top=\${self%/*}/$up
+exec "\$top/$loader" --library-path "\$top/${loader%/*}" --argv0 "\$self" "\$self.elf" "\$@"
 END
             chmod +x "$program"
         done
