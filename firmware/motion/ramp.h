@@ -1,0 +1,86 @@
+/* Ramps: the intervals of an acceleration or deceleration, one group of pulses after the other.
+ *
+ * Purpose: the ideal interval after pulse k (k = 0, 1, ...) of a ramp, summed over groups of pulses that will share one
+ *          or two neighbouring timer values. A group is one pulse at low speed; where neighbouring intervals differ by
+ *          less than a tick, or come faster than they can be computed, it is more. Sums are exact: what is rounded off
+ *          one group is carried into the next, so a ramp has no drift.
+ * Laws:    harmonic: interval = K / v, v changing by a constant amount per pulse (manual lines 77-89);
+ *          linear: t(k) = sqrt(k * C), C = 2 * alpha / accel (constant acceleration; manual lines 101-115, 265).
+ * Units:   ticks of 62.5 ns with a fraction in 1/256. Velocities in "units" = RPM * 100 * microstep factor, so that a
+ *          ramp value in hundredths is the change per pulse whatever the factor, and interval = K / v.
+ * Context: main loop only; no hardware. Tests: test/host/test_ramp.c, test/avr/.
+ * Limits:  steps_per_rev * slow_rpm >= 58 and steps_per_rev >= 8 (first intervals below about one second).
+ */
+#ifndef MOTION_RAMP_H
+#define MOTION_RAMP_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct {
+    uint32_t ticks;
+    uint8_t frac; /* 1/256 tick */
+} ramp_time_t;
+
+/* Depends on steps per revolution: 2 * 256 * K, K = 96e9 / steps_per_rev (ticks times velocity units). */
+typedef struct {
+    uint64_t k512;
+    float k512_float;
+} ramp_constants_t;
+
+typedef struct {
+    bool linear;
+    bool faster;          /* velocity grows from pulse to pulse */
+    uint16_t group;       /* pulses of the last group; 0: none yet */
+    uint16_t group_limit; /* what the next group would like to be */
+    uint32_t max_ticks;   /* linear: no interval above while slowing */
+    union {
+        struct {
+            uint32_t next2; /* twice the velocity of the next pulse */
+            uint32_t cap2;  /* never above */
+            uint32_t step;  /* change of velocity per pulse */
+            uint32_t mid2;  /* twice the velocity in the middle of the last group */
+            uint32_t q8;    /* interval there */
+            int32_t rest;   /* k512 - q8 * mid2, exact */
+            int32_t slope;  /* change of q8 from the group before */
+            int32_t curve;    /* change of slope, likewise */
+        } harmonic;
+        struct {
+            uint64_t t_q4;     /* time from standstill at the next pulse */
+            uint64_t c_q8;     /* C */
+            uint64_t group_c;  /* C times the group's pulses */
+            int64_t rest;      /* k * C - t^2, exact */
+            uint32_t sum_q4;   /* duration of the last group */
+            int32_t slope_q4;  /* its change from the group before */
+            int32_t curve_q4;  /* change of slope, likewise */
+        } linear;
+    } u;
+} ramp_t;
+
+/* steps_per_rev >= 8 */
+void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev);
+
+/* Interval at a velocity. v >= 1. */
+ramp_time_t ramp_interval(const ramp_constants_t *constants, uint32_t v);
+
+/* Velocity of an interval in ticks: the inverse. ticks >= 1. */
+uint32_t ramp_velocity(const ramp_constants_t *constants, uint32_t ticks);
+
+/* Harmonic ramp: v_first at the first pulse, changing by `step` units per pulse, never above v_cap. */
+void ramp_begin_harmonic(ramp_t *ramp, const ramp_constants_t *constants, uint32_t v_first, uint32_t step, bool faster,
+                         uint32_t v_cap);
+
+/* Linear ramp with C = c_q8 / 256 ticks^2 per pulse, beginning at the time t_q4 / 16 ticks from standstill, which is
+ * off by `rest` (ramp_linear_time). A slowing one never has an interval above max_ticks. */
+void ramp_begin_linear(ramp_t *ramp, uint64_t c_q8, uint64_t t_q4, int64_t rest, bool faster, uint32_t max_ticks);
+
+/* C for a ramp value in hundredths of rad/s^2. factor_log2: microsteps per full step. */
+uint64_t ramp_linear_c(uint16_t steps_per_rev, uint8_t factor_log2, uint32_t accel_centi);
+
+/* t from standstill to n pulses: sqrt(n * C), to one unit of 1/16 tick; *rest = n * C - t^2, what was rounded off. */
+uint64_t ramp_linear_time(uint64_t c_q8, uint32_t n, int64_t *rest);
+
+/* The next group of at most `left` pulses: returns how many (>= 1) and the sum of their intervals. */
+uint16_t ramp_next(ramp_t *ramp, const ramp_constants_t *constants, uint32_t left, ramp_time_t *sum);
+
+#endif

@@ -1,0 +1,48 @@
+/* What the motion engine needs of the hardware; implemented by hal/step_timer.c, faked in the host tests.
+ *
+ * Context: main loop only.
+ * Source:  datasheet DS40002061 chapter 16. */
+#ifndef MOTION_STEP_PORT_H
+#define MOTION_STEP_PORT_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+void step_port_init(void);
+
+/* Level of the dir pin, at once. Only in standstill. */
+void step_port_dir(bool level);
+
+/* Begins to play the ring, which holds at least one segment, after a short silent lead of STEP_PORT_LEAD_TICKS. */
+void step_port_start(void);
+#define STEP_PORT_LEAD_TICKS 64u
+
+/* Stops the timer at once, except that a pulse which has begun or is about to is completed first. Returns true if that
+ * was so: it ended after the snapshot's period count. No edge comes after the return. */
+bool step_port_halt(void);
+
+/* Where the step interrupt is, read in one atomic section. */
+typedef struct {
+    uint8_t tail;         /* step_tail */
+    uint16_t to_count;    /* periods of the loaded segment not yet begun (less those waited for early) */
+    bool pulse_high;      /* clk is high: the running period's pulse has been made */
+    bool period_over;     /* a period has ended that the interrupt has not counted yet */
+} step_snapshot_t;
+step_snapshot_t step_port_snapshot(void);
+
+/* Turns the silent closing segment at `offset` into one that ends with a pulse and, if `set_dir`, begins with the dir
+ * pin at `dir`; drops what follows it in the ring. False if it has begun already: nothing is changed then. */
+bool step_port_arm(uint8_t offset, uint16_t match, uint8_t flags);
+
+/* Adds one period to the segment at `offset` and drops what follows it in the ring. False if its end is too near. */
+bool step_port_extend(uint8_t offset);
+
+/* Ends the ring early: at the latest after the segment at `*last`, and within that one after at most `periods` more
+ * periods. Returns how many periods of it were dropped. */
+uint16_t step_port_shorten(uint8_t offset, uint16_t periods);
+
+/* Executes nothing that could be interrupted by the step interrupt between the two. */
+uint8_t step_port_lock(void);
+void step_port_unlock(uint8_t state);
+
+#endif
