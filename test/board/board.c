@@ -1,7 +1,6 @@
 /* The board's life and its processor loop. */
 #include "board_internal.h"
 
-#include <simavr/avr_watchdog.h>
 #include <simavr/sim_core.h>
 
 #include <stdarg.h>
@@ -9,50 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define MCU         "atmega328p"
 #define REG_SMCR    0x53
 #define SMCR_SE     0x01
 #define OPCODE_RETI 0x9518
-
-/* -- simavr's own messages ---------------------------------------------------------------------------------------- */
-
-/* simavr reports an illegal opcode or an access outside memory only through its log. Everything else it says is about
- * its own life and is dropped. */
-static void listen_to_simavr(avr_t *avr, const int level, const char *format, va_list arguments) {
-    board_t *b = avr ? avr->custom.data : NULL;
-    (void)arguments;
-    if (b == NULL || level != LOG_ERROR)
-        return;
-    if (strstr(format, "nvalid Opcode") != NULL)
-        board_crashed(b, "illegal opcode at 0x%04x", (unsigned)avr->pc);
-    else if (strstr(format, "nvalid") != NULL)
-        board_crashed(b, "access outside memory at 0x%04x", (unsigned)avr->pc);
-}
-
-void board_crashed(board_t *b, const char *format, ...) {
-    va_list arguments;
-    if (b->crash[0] == '\0') {
-        va_start(arguments, format);
-        vsnprintf(b->crash, sizeof b->crash, format, arguments);
-        va_end(arguments);
-    }
-    b->avr->state = cpu_Crashed;
-}
-
-const char *board_crash(const board_t *b) {
-    return b->crash[0] ? b->crash : NULL;
-}
-
-/* simavr passes WDR on as a request to its peripherals. */
-static int instruction_request(avr_io_t *io, uint32_t request, void *param) {
-    board_t *b = io->avr->custom.data;
-    (void)param;
-    if (request == AVR_IOCTL_WATCHDOG_RESET) {
-        watchdog_wdr(b, b->avr->cycle + 1);
-        return 0;
-    }
-    return -1;
-}
 
 /* -- life ------------------------------------------------------------------------------------------------------------ */
 
@@ -81,20 +39,10 @@ board_t *board_new(const char *elf_path, const uint8_t *eeprom) {
     if (b == NULL)
         return NULL;
 
-    avr_global_logger_set(listen_to_simavr);
-    b->avr = avr_make_mcu_by_name(MCU);
-    if (b->avr == NULL) {
-        fprintf(stderr, "simavr does not know " MCU "\n");
+    if (!simavr_start(b)) {
         free(b);
         return NULL;
     }
-    avr_init(b->avr);
-    b->avr->frequency = BOARD_CPU_HZ;
-    b->avr->custom.data = b;
-    b->avr->run_cycle_count = 0; /* one instruction a call of avr_run_one() */
-    b->instructions.kind = "instructions";
-    b->instructions.ioctl = instruction_request;
-    avr_register_io(b->avr, &b->instructions);
     for (int slot = 0; slot < EVENT_SLOTS; slot++)
         b->event_cycle[slot] = NEVER;
     b->next_event = NEVER;
@@ -128,6 +76,22 @@ void board_free(board_t *b) {
 
 uint64_t board_cycle(const board_t *b) {
     return board_time(b);
+}
+
+/* -- crashes ---------------------------------------------------------------------------------------------------- */
+
+void board_crashed(board_t *b, const char *format, ...) {
+    va_list arguments;
+    if (b->crash[0] == '\0') {
+        va_start(arguments, format);
+        vsnprintf(b->crash, sizeof b->crash, format, arguments);
+        va_end(arguments);
+    }
+    b->avr->state = cpu_Crashed;
+}
+
+const char *board_crash(const board_t *b) {
+    return b->crash[0] ? b->crash : NULL;
 }
 
 /* -- the processor loop -------------------------------------------------------------------------------------------- */
