@@ -155,7 +155,10 @@ bench: $(BUILD)/bench $(BUILD)/sac.elf ## measure the image on the board; writes
 
 # -- tests -----------------------------------------------------------------------------------------------------------
 
-TEST_INCLUDES := -I$(UNITY) -Itest -Ifirmware -Itest/host -Itest/host/fakes
+TEST_INCLUDES := -isystem $(UNITY) -Itest -Ifirmware -Itest/host -Itest/host/fakes
+
+# Where the tests find what they load.
+TEST_PATHS := -DBOARD_PROGRAMS_DIR='"$(BUILD)/board/programs"' -DSAC_ELF='"$(BUILD)/sac.elf"'
 
 HOST_BINS := $(HOST_TESTS:%=$(BUILD)/host/%)
 AVR_IMAGES := $(AVR_TESTS:%=$(BUILD)/avr/%.elf)
@@ -194,13 +197,13 @@ $(BOARD_IMAGES): $(BUILD)/board/programs/%.elf: $$(wildcard test/board/programs/
 
 $(BOARD_BINS): $(BUILD)/board/%: test/board/%.c $(BUILD)/unity.o $(BOARD_LIB) $(HOST_HEADERS)
 	@mkdir -p $(@D)
-	$(HOST_CC) $(HOST_CFLAGS) -O2 $(UNITY_FLAGS) $(TEST_INCLUDES) -Itest/board $(BOARD_LDFLAGS) -o $@ \
+	$(HOST_CC) $(HOST_CFLAGS) -O2 $(UNITY_FLAGS) $(TEST_INCLUDES) $(TEST_PATHS) -Itest/board $(BOARD_LDFLAGS) -o $@ \
 	    $(filter %.c %.o %.a,$^) $(BOARD_LIBS) -lm
 
 $(IMAGE_BINS): $(BUILD)/image/%: test/image/%.c $(IMAGE_COMMON_SRCS) $$($$*_SRCS) $(BUILD)/unity.o $(BOARD_LIB) \
     $(HOST_HEADERS)
 	@mkdir -p $(@D)
-	$(HOST_CC) $(HOST_CFLAGS) -O2 $(UNITY_FLAGS) $(TEST_INCLUDES) -Itest/board $(BOARD_LDFLAGS) -o $@ \
+	$(HOST_CC) $(HOST_CFLAGS) -O2 $(UNITY_FLAGS) $(TEST_INCLUDES) $(TEST_PATHS) -Itest/board $(BOARD_LDFLAGS) -o $@ \
 	    $(filter %.c %.o %.a,$^) $(BOARD_LIBS) -lm
 
 HOST_PARTS := $(HOST_BINS)
@@ -218,11 +221,11 @@ unity_runs = $(foreach run,$(1),--unity $(run))
 .PHONY: test
 test: ## everything: builds, runs and sums up all tests and checks
 	@$(call build_parts,test-parts)
-	@$(RUN_TESTS) $(call unity_runs,$(IMAGE_BINS) $(BOARD_BINS) $(HOST_BINS)) \
+	@$(RUN_TESTS) --results $(BUILD)/test-results $(call unity_runs,$(IMAGE_BINS) $(BOARD_BINS) $(HOST_BINS)) \
 	    $(foreach run,$(AVR_TESTS),--unity '$(BUILD)/avr/run $(BUILD)/avr/$(run).elf') \
 	    $(foreach check,$(CHECKS),--check $(check)) --check newer='$(MAKE) -s --no-print-directory newer' \
 	    $(if $(CI),--check crosscheck='tools/crosscheck/run.sh') \
-	    --last trace='$(PYTHON) tools/trace.py --quiet'
+	    --last trace='$(PYTHON) tools/trace.py --results $(BUILD)/test-results --quiet'
 
 .PHONY: test-host
 test-host: ## the pure modules on this machine, with the sanitizers, and their arithmetic on the AVR
@@ -242,7 +245,7 @@ test-image: ## the whole image on the simulated board
 
 .PHONY: trace
 trace: ## which requirement which passing test shows (of the last `make test`); raises docs/trace-count
-	@$(PYTHON) tools/trace.py --raise
+	@$(PYTHON) tools/trace.py --results $(BUILD)/test-results --raise
 
 .PHONY: crosscheck
 crosscheck: ## the image in avr8js: the edges of clk compared with the board's (needs Node 20)
