@@ -60,9 +60,9 @@ IMAGE_COMMON_SRCS :=
 
 # Checks of tools/ that count as one test each.
 CHECKS := \
-    includes='$(PYTHON) tools/check_includes.py' \
-    pins='$(PYTHON) tools/check_pins.py' \
-    budgets='$(MAKE) -s --no-print-directory BUILD=$(BUILD) budgets'
+    --check includes='$(PYTHON) tools/check_includes.py' \
+    --check pins='$(PYTHON) tools/check_pins.py' \
+    --check budgets='$(MAKE) -s --no-print-directory budgets'
 
 # The board, its models and the simulator program list their own sources.
 -include test/board/board.mk
@@ -180,11 +180,12 @@ $(HOST_BINS): $(BUILD)/host/%: test/host/%.c $$($$*_SRCS) $(BUILD)/unity-sanitiz
 	@mkdir -p $(@D)
 	$(HOST_CC) $(HOST_CFLAGS) -O1 $(UNITY_FLAGS) $(SANITIZE) $(TEST_INCLUDES) -o $@ $(filter %.c %.o,$^) -lm
 
-# Unity reports over the serial port; the runner passes on what it says.
+# Unity reports over the serial port; the runner passes on what it says. -UAVR: Unity 2.5 would put its words into flash
+# and read them from RAM.
 $(AVR_IMAGES): $(BUILD)/avr/%.elf: test/host/%.c $$($$*_SRCS) test/avr/report.c $(HOST_HEADERS) Makefile
 	@mkdir -p $(@D)
 	$(AVR)gcc $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 -Os -g -fshort-enums -ffunction-sections -fdata-sections \
-	    -Wl,--gc-sections -include test/avr/report.h -DUNITY_EXCLUDE_FLOAT $(TEST_INCLUDES) -o $@ \
+	    -Wl,--gc-sections -UAVR -include test/avr/report.h -DUNITY_EXCLUDE_FLOAT $(TEST_INCLUDES) -o $@ \
 	    $(filter %.c,$^) $(UNITY)/unity.c
 
 $(BUILD)/avr/run: test/avr/run.c $(BOARD_LIB) $(HOST_HEADERS)
@@ -223,7 +224,7 @@ test: ## everything: builds, runs and sums up all tests and checks
 	@$(call build_parts,test-parts)
 	@$(RUN_TESTS) --results $(BUILD)/test-results $(call unity_runs,$(IMAGE_BINS) $(BOARD_BINS) $(HOST_BINS)) \
 	    $(foreach run,$(AVR_TESTS),--unity '$(BUILD)/avr/run $(BUILD)/avr/$(run).elf') \
-	    $(foreach check,$(CHECKS),--check $(check)) --check newer='$(MAKE) -s --no-print-directory newer' \
+	    $(CHECKS) --check newer='$(MAKE) -s --no-print-directory newer' \
 	    $(if $(CI),--check crosscheck='tools/crosscheck/run.sh') \
 	    --last trace='$(PYTHON) tools/trace.py --results $(BUILD)/test-results --quiet'
 
@@ -285,7 +286,7 @@ format: ## clang-format on all C files that git knows
 
 .PHONY: lint
 lint: ## the checks alone: includes, pin table, budgets; shell scripts where shellcheck is installed
-	@$(RUN_TESTS) --results $(BUILD)/lint $(foreach check,$(CHECKS),--check $(check))
+	@$(RUN_TESTS) --results $(BUILD)/lint $(CHECKS)
 	@if command -v shellcheck >/dev/null; then shellcheck sac tools/setup.sh .ci/run; fi
 
 .PHONY: setup
