@@ -1,0 +1,20 @@
+/* sacsim: SAC's firmware on a simulated Arduino Nano. docs/simulator.md is its manual. */
+#include <signal.h>
+
+#include "console.h"
+#include "options.h"
+#include "session.h"
+
+int main(int argc, char **argv) {
+    options_t options;
+    int code;
+
+    options_parse(&options, argc, argv);
+    code = session_run(&options);
+    console_restore();
+    if (code < 0) { /* end as the signal would have, so that a calling shell knows */
+        signal(-code, SIG_DFL);
+        raise(-code);
+    }
+    return code;
+}
