@@ -78,6 +78,7 @@ private_apt_update() { # RELEASE
         [ ! -e "$keyring" ] || break
     done
     [ -e "$keyring" ] || fail "Debian's archive keyring is missing: apt-get install debian-archive-keyring"
+    trap 'rm -rf "$tools/apt" "$tools"/*.part' EXIT
     mkdir -p "$private/none" "$private/lists/partial" "$private/cache/archives/partial"
     # Security mirrors hold no whole release; of the others the first that has this one is taken.
     # shellcheck disable=SC2016 # apt's own placeholder
@@ -110,8 +111,6 @@ unpack() { # RELEASE FOLDER PACKAGE=VERSION SHA256 [PACKAGE=VERSION SHA256 ...]
         shift 2
     done
 }
-
-trap 'rm -rf "$tools/apt" "$tools"/*.part' EXIT
 
 # -- the two compilers -----------------------------------------------------------------------------------------------
 
