@@ -4,8 +4,8 @@
 
 BOARD_SRCS += $(addprefix test/board/, board.c events.c extint.c image.c irq.c measures.c pins.c registers.c \
     simavr_glue.c timer.c timer16.c timer8.c timers.c)
-BOARD_TESTS +=
-BOARD_PROGRAMS +=
+BOARD_TESTS += test_board_timers
+BOARD_PROGRAMS += remote irq_order masked crash
 BOARD_CFLAGS += -Itest/board
 # simavr's static library; whatever the board defines itself stays out of the link (simavr_glue.c).
 BOARD_LIBS += -l:libsimavr.a -lelf -lm -lpthread
