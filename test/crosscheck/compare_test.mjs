@@ -1,18 +1,18 @@
 /* The comparison of the cross-check must see each kind of difference. Prints one line; exit status 1 on a failure. */
 import assert from 'node:assert/strict';
-import { compare, EXACT_BOUND, RAW_BOUND, START_BOUND } from '../../tools/crosscheck/compare.mjs';
+import { ANY, compare, EXACT_BOUND, RAW_BOUND, START_BOUND } from '../../tools/crosscheck/compare.mjs';
 
 const PERIOD = 1000;
 const PULSES = 20;
 const TRAINS = [12, 8];
 
 /* Two runs that agree; witnessChange and boardChange get the edge, its number, and may return another edge or null. */
-function verdict(witnessChange, boardChange = (edge) => edge) {
+function verdict(witnessChange, boardChange = (edge) => edge, trains = TRAINS) {
     const times = Array.from({ length: PULSES }, (_, i) => 5000 + i * PERIOD + (i >= TRAINS[0] ? 777 : 0));
     const list = (edges, change) => edges.map(change).filter((edge) => edge);
     const witness = { edges: list(times.map((at) => ({ exact: at, raw: at, dir: 0 })), witnessChange) };
     const board = { edges: list(times.map((at) => ({ cycle: at, dir: 0 })), boardChange) };
-    return compare('test', witness, board, TRAINS).faults;
+    return compare('test', witness, board, trains).faults;
 }
 
 const same = (edge) => edge;
@@ -42,6 +42,11 @@ const tests = {
     },
     'a missing last edge fails': () =>
         assert.notDeepEqual(verdict(same, (edge, i) => (i === PULSES - 1 ? null : edge)), []),
+    'a start cut short passes': () => assert.deepEqual(verdict((edge, i) => later(edge, i < 12 ? 0 : 9), undefined, [ANY, 8]), []),
+    'a start cut short by another edge fails': () =>
+        assert.notDeepEqual(verdict((edge, i) => (i === 11 ? null : edge), undefined, [ANY, 8]), []),
+    'fewer edges than commanded beside a start cut short fail': () =>
+        assert.notDeepEqual(verdict(same, undefined, [ANY, PULSES + 1]), []),
     'another dir fails': () =>
         assert.notDeepEqual(verdict((edge, i) => (i === 7 ? { ...edge, dir: 1 } : edge)), []),
 };

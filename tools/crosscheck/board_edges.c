@@ -21,15 +21,17 @@ static const board_pin_t clk = BOARD_PIN('B', 2);
 static const board_pin_t dir = BOARD_PIN('B', 5);
 
 typedef struct {
-    board_t *board;
     FILE *edges;
+    int dir_level;
 } run_t;
 
 static void on_edge(void *ctx, board_edge_t edge)
 {
     run_t *run = ctx;
-    if (edge.pin == clk && edge.level)
-        fprintf(run->edges, "%" PRIu64 " %d\n", edge.cycle, board_pin_level(run->board, dir));
+    if (edge.pin == dir)
+        run->dir_level = edge.level;
+    else if (edge.level)
+        fprintf(run->edges, "%" PRIu64 " %d\n", edge.cycle, run->dir_level);
 }
 
 static bool run_to(board_t *board, uint64_t cycle)
@@ -64,20 +66,22 @@ static bool obey(board_t *board, const char *line)
 
 static bool play(const char *image, FILE *script, FILE *edges)
 {
-    run_t run = {.board = board_new(image, NULL), .edges = edges};
-    if (!run.board)
+    board_t *board = board_new(image, NULL);
+    if (!board)
         return false;
-    board_record(run.board, clk, true);
-    board_on_edge(run.board, on_edge, &run);
+    run_t run = {.edges = edges, .dir_level = board_pin_level(board, dir) > 0};
+    board_record(board, clk, true);
+    board_record(board, dir, true);
+    board_on_edge(board, on_edge, &run);
     bool ok = true;
     char line[LINE_BYTES];
     while (ok && fgets(line, sizeof line, script))
-        ok = obey(run.board, line);
+        ok = obey(board, line);
     fputs("text ", edges);
-    for (const char *sent = board_uart_text(run.board); *sent; sent++)
+    for (const char *sent = board_uart_text(board); *sent; sent++)
         fprintf(edges, "%02x", (unsigned char)*sent);
     fputc('\n', edges);
-    board_free(run.board);
+    board_free(board);
     return ok;
 }
 

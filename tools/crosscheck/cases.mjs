@@ -3,7 +3,10 @@
  * name     the row of the table
  * typed    [milliseconds after the first line may be typed, bytes]
  * pulses   how many pulses each start from standstill must make, in order; within one of them intervals are compared
+ *          (ANY: as many as the board; a stop cuts it short)
  * ms       length of the run after the first line */
+import { ANY } from './compare.mjs';
+
 export const cases = [
     { name: 'single pulses + + - -', typed: [[0, '+'], [5, '+'], [10, '-'], [15, '-']], pulses: [1, 1, 1, 1], ms: 40 },
     { name: 'harmonic', typed: [[0, 'm400v150a1d1\r']], pulses: [400], ms: 2000 },
@@ -29,4 +32,8 @@ export const cases = [
     { name: 'cruise vc3', typed: [[0, 'm100000vc3a999d999\r']], pulses: [100000], ms: 350 },
     { name: 'cruise vc2', typed: [[0, 'm100000vc2a999d999\r']], pulses: [100000], ms: 250 },
     { name: 'long, 5 rev/s', typed: [[0, 'm6000v300a2d2\r']], pulses: [6000], ms: 6800 },
+    { name: 'stop with prejudice, then a start', typed: [[0, 'm2000v150a10d10\r'], [401, 'S\r'], [450, 'm50\r']], pulses: [ANY, 50], ms: 900 },
+    { name: 'stop with grace, then a start', typed: [[0, 'm2000v150a10d10\r'], [401, 's\r'], [900, 'm50\r']], pulses: [ANY, 50], ms: 1400 },
+    { name: 'next with grace', typed: [[0, 'm2000v150a5d5\r'], [20, 'm-50\r'], [501, 'n\r']], pulses: [ANY], ms: 1600 },
+    { name: 'next with prejudice', typed: [[0, 'm2000v150a5d5\r'], [20, 'm50\r'], [501, 'N\r']], pulses: [ANY], ms: 1200 },
 ];

@@ -6,10 +6,9 @@ CROSSCHECK := $(BUILD)/crosscheck
 .PHONY: crosscheck-parts
 crosscheck-parts: $(BUILD)/sac.hex $(CROSSCHECK)/board_edges $(CROSSCHECK)/probe.hex
 
-$(CROSSCHECK)/board_edges: tools/crosscheck/board_edges.c $(BOARD_SRCS) $(wildcard test/board/*.h)
+$(CROSSCHECK)/board_edges: tools/crosscheck/board_edges.c $(BOARD_LIB) test/board/board.h
 	@mkdir -p $(@D)
-	$(HOST_CC) -std=gnu11 -O2 -g $(HOST_WARNINGS) $(BOARD_CFLAGS) -Itest/board -o $@ $(filter %.c,$^) \
-	    $(BOARD_LDFLAGS) $(BOARD_LIBS)
+	$(HOST_CC) $(HOST_CFLAGS) -O2 -Itest/board $(BOARD_LDFLAGS) -o $@ $(filter %.c %.a,$^) $(BOARD_LIBS)
 
 $(CROSSCHECK)/probe.elf: tools/crosscheck/probe.S tools/crosscheck/probe_periods.def
 	@mkdir -p $(@D)
