@@ -24,6 +24,7 @@ RAM_START, RAM_END = 0x100, 0x8FF
 VECTORS, VECTOR_BYTES = 26, 4
 RETURN_ADDRESS_BYTES = 2
 SYMBOL_LINE = re.compile(r"^([0-9a-f]{8}) <(.+)>:$")
+LOCAL_LABEL = re.compile(r"\.L|L\d+[^\w.]")  # -mrelax keeps the assembler's own
 CODE_LINE = re.compile(r"^ *([0-9a-f]+):\t([a-z]+)\t?([^;]*)(?:;(.*))?$")
 TARGET = re.compile(r"0x([0-9a-f]+)")
 BRANCHES = ("br",)
@@ -55,7 +56,7 @@ class Image:
                     found = TARGET.search(match[4] or "")
                     target = int(found[1], 16) if found else None
                 self.code[int(match[1], 16)] = (mnemonic, operands, target)
-            elif match := SYMBOL_LINE.match(line):
+            elif (match := SYMBOL_LINE.match(line)) and not LOCAL_LABEL.match(match[2]):
                 self.symbols.append((int(match[1], 16), match[2]))
         addresses = sorted(self.code)
         self.next = dict(zip(addresses, addresses[1:]))
