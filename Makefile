@@ -31,6 +31,8 @@ FIRMWARE_SRCS := \
     firmware/base/number.c \
     firmware/base/status.c \
     firmware/motion/ramp.c \
+    firmware/motion/profile.c \
+    firmware/motion/engine.c \
     firmware/queue/queue.c \
     firmware/queue/session.c \
     firmware/cli/commands.c \
@@ -40,7 +42,9 @@ FIRMWARE_SRCS := \
     firmware/cli/terminal.c \
     firmware/cli/text.c \
     firmware/hal/sleep.c \
+    firmware/hal/pins.c \
     firmware/hal/step_isr.S \
+    firmware/hal/step_timer.c \
     firmware/hal/timebase.c \
     firmware/hal/usart.c \
     firmware/hal/usart_isr.S
@@ -48,10 +52,24 @@ FIRMWARE_SRCS := \
 # -- the tests -------------------------------------------------------------------------------------------------------
 # Host tests: test/host/<name>.c, one binary a module, with the sources that <name>_SRCS lists.
 
-HOST_TESTS :=
+HOST_TESTS := test_number test_status test_baud test_line test_session test_queue test_motion_syntax test_commands \
+    test_display test_terminal
+FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
+CLI_SRCS := firmware/cli/commands.c firmware/cli/display.c firmware/cli/text.c firmware/cli/motion_syntax.c \
+    firmware/base/number.c firmware/queue/queue.c firmware/queue/session.c firmware/settings.c $(FAKE_SRCS)
+test_number_SRCS := firmware/base/number.c
+test_status_SRCS := firmware/base/status.c
+test_line_SRCS := firmware/cli/line.c
+test_session_SRCS := firmware/queue/session.c firmware/settings.c
+test_queue_SRCS := firmware/queue/queue.c firmware/settings.c $(FAKE_SRCS)
+test_motion_syntax_SRCS := firmware/cli/motion_syntax.c firmware/base/number.c firmware/queue/session.c \
+    firmware/settings.c $(FAKE_SRCS)
+test_commands_SRCS := $(CLI_SRCS)
+test_display_SRCS := $(CLI_SRCS)
+test_terminal_SRCS := $(CLI_SRCS) firmware/cli/terminal.c firmware/cli/line.c firmware/base/status.c
 
 # Arithmetic that is tested on the AVR as well: the same source, compiled by avr-gcc, run on the simulated board.
-AVR_TESTS :=
+AVR_TESTS := test_number
 
 # Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
 IMAGE_TESTS :=

@@ -181,6 +181,11 @@ static void take(uint8_t byte)
 void terminal_init(void)
 {
     line_reset(&line);
+    echoed = 0;
+    behind = false;
+    owes_new_line = false;
+    owes_times = false;
+    owed_status = STATUS_OK;
     display_init();
     text_put_flash(version_line);
     text_put_flash(prompt);

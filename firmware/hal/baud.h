@@ -17,13 +17,13 @@ typedef struct {
 
 static inline uint32_t baud_error(uint32_t baud, uint8_t samples, uint16_t divisor)
 {
-    const uint32_t real = BOARD_CPU_HZ / samples / divisor;
+    const uint32_t real = (uint32_t)BOARD_CPU_HZ / samples / divisor;
     return real > baud ? real - baud : baud - real;
 }
 
 static inline uint16_t baud_nearest(uint32_t baud, uint8_t samples)
 {
-    const uint32_t clocks = BOARD_CPU_HZ / samples;
+    const uint32_t clocks = (uint32_t)BOARD_CPU_HZ / samples;
     const uint32_t divisor = (clocks + baud / 2) / baud;
     return divisor < 1 ? 1 : divisor > 4096 ? 4096 : (uint16_t)divisor;
 }

@@ -1,0 +1,124 @@
+#include "host/fakes/engine_fake.h"
+#include <string.h>
+#include "host/fakes/terminal_port_fake.h"
+#include "settings.h"
+
+engine_fake_t engine_fake;
+
+void engine_fake_reset(void)
+{
+    memset(&engine_fake, 0, sizeof engine_fake);
+    engine_fake.accepts = true;
+    engine_fake.gap = true;
+    engine_fake.rpm = settings.slow_rpm;
+    engine_fake.cycle_us = 30000;
+}
+
+uint32_t command_rpm(const motion_command_t *command)
+{
+    if (command->flags & MOTION_CYCLE) {
+        return (uint32_t)(60000000ull / settings.steps_per_rev / command->velocity);
+    }
+    return command->velocity;
+}
+
+uint32_t command_cycle_us(const motion_command_t *command)
+{
+    if (command->flags & MOTION_CYCLE) {
+        return command->velocity;
+    }
+    return (uint32_t)(60000000ull / settings.steps_per_rev / command->velocity);
+}
+
+status_t engine_check(const motion_command_t *command)
+{
+    const double period_us = (double)command_cycle_us(command) / (1 << settings.ustep);
+    return period_us < 2 || period_us < settings.pulse_us + 1 ? STATUS_PERIOD_TOO_SHORT : STATUS_OK;
+}
+
+void engine_init(void)
+{
+}
+
+bool engine_poll(void)
+{
+    return false;
+}
+
+bool engine_can_accept(void)
+{
+    return engine_fake.accepts;
+}
+
+void engine_submit(const motion_command_t *command)
+{
+    engine_fake.submitted[engine_fake.submitted_count++ % ENGINE_FAKE_COMMANDS] = *command;
+    engine_fake.sent_at_submit = terminal_port_fake_sent();
+}
+
+uint8_t engine_commands_ended(void)
+{
+    return engine_fake.ended;
+}
+
+void engine_stop(void)
+{
+    engine_fake.stops++;
+}
+
+void engine_stop_graceful(accel_code_t decel, bool linear)
+{
+    engine_fake.stops_graceful++;
+    engine_fake.graceful_decel = decel;
+    engine_fake.graceful_linear = linear;
+}
+
+void engine_next(void)
+{
+    engine_fake.nexts++;
+}
+
+void engine_next_graceful(void)
+{
+    engine_fake.nexts_graceful++;
+}
+
+void engine_single_pulse(bool ccw)
+{
+    if (ccw) {
+        engine_fake.pulses_ccw++;
+    } else {
+        engine_fake.pulses_cw++;
+    }
+}
+
+motion_state_t engine_state(void)
+{
+    return engine_fake.state;
+}
+
+int32_t engine_position(void)
+{
+    return engine_fake.position;
+}
+
+void engine_velocity(uint32_t *rpm, uint32_t *cycle_us)
+{
+    *rpm = engine_fake.rpm;
+    *cycle_us = engine_fake.cycle_us;
+}
+
+void engine_set_gap(bool on)
+{
+    engine_fake.gap = on;
+}
+
+bool engine_gap(void)
+{
+    return engine_fake.gap;
+}
+
+uint8_t engine_faults(void)
+{
+    return engine_fake.faults;
+}
