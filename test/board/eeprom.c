@@ -24,22 +24,26 @@ struct eeprom {
     uint8_t value;          /* that it will have */
 };
 
-static void request(board_t *b, uint64_t cycle) {
+static void request(board_t *b, uint64_t cycle)
+{
     irq_set(b, VECTOR_EE_READY, !b->eeprom->busy && REG(b, EECR) & EERIE, cycle);
 }
 
-static void ended(board_t *b, uint64_t cycle) {
+static void ended(board_t *b, uint64_t cycle)
+{
     struct eeprom *e = b->eeprom;
     e->cells[e->address] = e->value;
     e->busy = false;
     request(b, cycle);
 }
 
-static uint16_t addressed(const board_t *b) {
+static uint16_t addressed(const board_t *b)
+{
     return (uint16_t)((REG(b, EEARH) << 8 | REG(b, EEARL)) % BOARD_EEPROM_BYTES);
 }
 
-static void start_write(board_t *b, uint64_t cycle) {
+static void start_write(board_t *b, uint64_t cycle)
+{
     struct eeprom *e = b->eeprom;
     uint8_t mode = REG(b, EECR) & (EEPM1 | EEPM0);
     uint8_t data = REG(b, EEDR);
@@ -57,12 +61,15 @@ static void start_write(board_t *b, uint64_t cycle) {
     cpu_halt(b, 2);
 }
 
-static uint8_t read_control(board_t *b, uint16_t address, uint64_t cycle) {
+static uint8_t read_control(board_t *b, uint16_t address, uint64_t cycle)
+{
     const struct eeprom *e = b->eeprom;
-    return (uint8_t)(REG(b, address) | (e->busy ? EEPE : 0) | (cycle < e->enabled_until ? EEMPE : 0));
+    uint8_t kept = REG(b, address) & (EEPM1 | EEPM0 | EERIE); /* simavr stores what a hook returns */
+    return (uint8_t)(kept | (e->busy ? EEPE : 0) | (cycle < e->enabled_until ? EEMPE : 0));
 }
 
-static void write_control(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_control(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     struct eeprom *e = b->eeprom;
     uint8_t strobes = reg_written_ones(b, value);
     bool enabled = cycle <= e->enabled_until;
@@ -83,13 +90,15 @@ static void write_control(board_t *b, uint16_t address, uint8_t value, uint64_t 
     request(b, cycle);
 }
 
-static void write_address(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_address(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     (void)cycle;
     if (!b->eeprom->busy)
         REG(b, address) = address == EEARH ? value & 0x03 : value;
 }
 
-void eeprom_init(board_t *b) {
+void eeprom_init(board_t *b)
+{
     struct eeprom *e = b->eeprom = calloc(1, sizeof *e);
     if (!e)
         abort();
@@ -101,14 +110,16 @@ void eeprom_init(board_t *b) {
     reg_on_write(b, EEARH, write_address);
 }
 
-void eeprom_load(board_t *b, const uint8_t *cells) {
+void eeprom_load(board_t *b, const uint8_t *cells)
+{
     if (cells == NULL)
         cells = b->image_eeprom;
     if (cells != NULL)
         memcpy(b->eeprom->cells, cells, sizeof b->eeprom->cells);
 }
 
-void eeprom_reset(board_t *b) {
+void eeprom_reset(board_t *b)
+{
     struct eeprom *e = b->eeprom;
 
     e->enabled_until = 0;
@@ -116,7 +127,8 @@ void eeprom_reset(board_t *b) {
     request(b, board_time(b));
 }
 
-void eeprom_power_fails(board_t *b) {
+void eeprom_power_fails(board_t *b)
+{
     struct eeprom *e = b->eeprom;
 
     if (e->busy) {
@@ -126,30 +138,36 @@ void eeprom_power_fails(board_t *b) {
     }
 }
 
-void eeprom_free(board_t *b) {
+void eeprom_free(board_t *b)
+{
     free(b->eeprom);
     b->eeprom = NULL;
 }
 
 /* -- board.h --------------------------------------------------------------------------------------------------------- */
 
-static void power_cut(board_t *b, uint64_t cycle) {
+static void power_cut(board_t *b, uint64_t cycle)
+{
     (void)cycle;
     board_reset(b, BOARD_RESET_POWER_ON);
 }
 
-uint8_t *board_eeprom(board_t *b) {
+uint8_t *board_eeprom(board_t *b)
+{
     return b->eeprom->cells;
 }
 
-void board_eeprom_cut_at(board_t *b, uint64_t cycle) {
+void board_eeprom_cut_at(board_t *b, uint64_t cycle)
+{
     event_at(b, EVENT_POWER_CUT, cycle, power_cut);
 }
 
-void board_eeprom_torn_byte(board_t *b, uint8_t value) {
+void board_eeprom_torn_byte(board_t *b, uint8_t value)
+{
     b->eeprom->torn = value;
 }
 
-uint32_t board_eeprom_writes(const board_t *b, uint16_t address) {
+uint32_t board_eeprom_writes(const board_t *b, uint16_t address)
+{
     return address < BOARD_EEPROM_BYTES ? b->eeprom->writes[address] : 0;
 }

@@ -18,11 +18,13 @@ struct watchdog {
     uint64_t changed_until; /* WDCE falls at this edge; a write at the same edge still finds it set */
 };
 
-static bool runs(const board_t *b) {
+static bool runs(const board_t *b)
+{
     return REG(b, WDTCSR) & (WDE | WDIE);
 }
 
-static uint64_t period(const board_t *b) {
+static uint64_t period(const board_t *b)
+{
     uint8_t control = REG(b, WDTCSR);
     uint32_t select = (control & WDP210) | (control & WDP3 ? 8u : 0u);
     if (select > 9)
@@ -33,7 +35,8 @@ static uint64_t period(const board_t *b) {
 static void timed_out(board_t *b, uint64_t cycle);
 
 /* The next time-out after this cycle. */
-static void plan(board_t *b, uint64_t cycle) {
+static void plan(board_t *b, uint64_t cycle)
+{
     if (!runs(b)) {
         event_cancel(b, EVENT_WATCHDOG);
         return;
@@ -43,12 +46,14 @@ static void plan(board_t *b, uint64_t cycle) {
     event_at(b, EVENT_WATCHDOG, cleared + ((cycle - cleared) / n + 1) * n, timed_out);
 }
 
-static void request(board_t *b, uint64_t cycle) {
+static void request(board_t *b, uint64_t cycle)
+{
     uint8_t both = WDIE | WDIF;
     irq_set(b, VECTOR_WDT, (REG(b, WDTCSR) & both) == both, cycle);
 }
 
-static void timed_out(board_t *b, uint64_t cycle) {
+static void timed_out(board_t *b, uint64_t cycle)
+{
     uint8_t control = REG(b, WDTCSR);
 
     if (control & WDE && (!(control & WDIE) || control & WDIF)) {
@@ -60,7 +65,8 @@ static void timed_out(board_t *b, uint64_t cycle) {
     plan(b, cycle);
 }
 
-static void acknowledged(board_t *b, int vector, uint64_t cycle) {
+static void acknowledged(board_t *b, int vector, uint64_t cycle)
+{
     (void)vector;
     uint8_t control = (uint8_t)(REG(b, WDTCSR) & ~WDIF);
     if (control & WDE)
@@ -69,11 +75,14 @@ static void acknowledged(board_t *b, int vector, uint64_t cycle) {
     request(b, cycle);
 }
 
-static uint8_t read_control(board_t *b, uint16_t address, uint64_t cycle) {
-    return (uint8_t)(REG(b, address) | (cycle < b->watchdog->changed_until ? WDCE : 0));
+static uint8_t read_control(board_t *b, uint16_t address, uint64_t cycle)
+{
+    uint8_t kept = REG(b, address) & (uint8_t)~WDCE; /* simavr stores what a hook returns */
+    return (uint8_t)(kept | (cycle < b->watchdog->changed_until ? WDCE : 0));
 }
 
-static void write_control(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_control(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     struct watchdog *w = b->watchdog;
     const uint8_t guarded = WDP3 | WDP210 | WDE;
     uint8_t old = REG(b, address);
@@ -99,12 +108,14 @@ static void write_control(board_t *b, uint16_t address, uint8_t value, uint64_t 
     plan(b, cycle);
 }
 
-void watchdog_wdr(board_t *b, uint64_t cycle) {
+void watchdog_wdr(board_t *b, uint64_t cycle)
+{
     b->watchdog->cleared = cycle;
     plan(b, cycle);
 }
 
-void watchdog_init(board_t *b) {
+void watchdog_init(board_t *b)
+{
     b->watchdog = calloc(1, sizeof *b->watchdog);
     if (!b->watchdog)
         abort();
@@ -113,7 +124,8 @@ void watchdog_init(board_t *b) {
     irq_on_ack(b, VECTOR_WDT, acknowledged);
 }
 
-void watchdog_reset(board_t *b) {
+void watchdog_reset(board_t *b)
+{
     b->watchdog->cleared = board_time(b);
     b->watchdog->changed_until = 0;
     REG(b, WDTCSR) = 0;
@@ -121,12 +133,14 @@ void watchdog_reset(board_t *b) {
     plan(b, board_time(b));
 }
 
-void watchdog_force(board_t *b) {
+void watchdog_force(board_t *b)
+{
     REG(b, WDTCSR) |= WDE;
     plan(b, board_time(b));
 }
 
-void watchdog_free(board_t *b) {
+void watchdog_free(board_t *b)
+{
     free(b->watchdog);
     b->watchdog = NULL;
 }

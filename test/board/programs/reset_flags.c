@@ -11,8 +11,7 @@ volatile uint8_t r_kept NOINIT;       /* a RAM cell that nobody initialises */
 volatile uint8_t r_boots NOINIT;
 volatile uint8_t r_mcusr NOINIT;
 volatile uint8_t r_wdtcsr NOINIT;
-volatile uint8_t r_io[9] NOINIT;
-volatile uint8_t r_sp[2] NOINIT;
+volatile uint8_t r_io[8] NOINIT;
 volatile uint8_t r_ready;
 
 __attribute__((naked, used, section(".init3"))) void look_first(void)
@@ -35,7 +34,6 @@ int main(void)
     r_io[5] = UBRR0L;
     r_io[6] = TCCR1B;
     r_io[7] = EECR;
-    r_io[8] = SREG;
     r_boots++;
 
     DDRB = 0x04;

@@ -22,7 +22,7 @@ ISR(USART_UDRE_vect)
     UDR0 = ring[tail++];
     r_sent++;
     if (tail == head) {
-        UCSR0B &= (uint8_t)~(1 << UDRIE0);
+        UCSR0B &= (uint8_t) ~(1 << UDRIE0);
     }
 }
 

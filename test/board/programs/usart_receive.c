@@ -8,8 +8,8 @@ volatile uint16_t p_ubrr NOINIT;
 volatile uint8_t p_ucsra NOINIT;
 volatile uint8_t p_ucsrb NOINIT; /* UCSZ02; RXEN0 is added */
 volatile uint8_t p_ucsrc NOINIT;
-volatile uint8_t p_hold NOINIT;  /* 1: leave the bytes where they are */
-volatile uint8_t p_flush;        /* 1: RXEN0 off and on, then 0 again */
+volatile uint8_t p_hold NOINIT; /* 1: leave the bytes where they are */
+volatile uint8_t p_flush;       /* 1: RXEN0 off and on, then 0 again */
 
 volatile uint8_t r_count;
 volatile uint8_t r_status[256];

@@ -13,10 +13,10 @@ volatile uint8_t p_ucsra_first NOINIT; /* U2X0 before UBRR0 or after */
 volatile uint8_t p_count NOINIT;
 volatile uint8_t p_bytes[32] NOINIT;
 
-volatile uint8_t r_at_reset[5];   /* UCSR0A, UCSR0B, UCSR0C, UBRR0H, UBRR0L */
-volatile uint8_t r_complete;      /* UCSR0A when TXC0 was seen */
-volatile uint8_t r_zero_written;  /* after a write of TXC0 = 0 */
-volatile uint8_t r_one_written;   /* after a write of TXC0 = 1 */
+volatile uint8_t r_at_reset[5];  /* UCSR0A, UCSR0B, UCSR0C, UBRR0H, UBRR0L */
+volatile uint8_t r_complete;     /* UCSR0A when TXC0 was seen */
+volatile uint8_t r_zero_written; /* after a write of TXC0 = 0 */
+volatile uint8_t r_one_written;  /* after a write of TXC0 = 1 */
 volatile uint8_t r_done;
 
 int main(void)

@@ -1,6 +1,7 @@
-/* Sets the watchdog as the test asks, with or without the timed sequence, and waits; counts its interrupts. */
+/* Sets the watchdog as the test asks, with or without the timed sequence, and waits in IDLE; counts its interrupts. */
 #include <avr/interrupt.h>
 #include <avr/io.h>
+#include <avr/sleep.h>
 #include <avr/wdt.h>
 #include <stdint.h>
 
@@ -36,8 +37,9 @@ int main(void)
 {
     r_boots++;
     if (r_mcusr & (1 << WDRF)) {
-        r_ready = 2; /* the watchdog bit: stay here */
+        r_ready = 2; /* the watchdog has bitten: stay here */
         for (;;) {
+            sleep_mode();
         }
     }
     uint8_t wanted = p_wdtcsr;
@@ -54,6 +56,8 @@ int main(void)
     for (;;) {
         if (p_feed == 1) {
             wdt_reset();
+        } else {
+            sleep_mode();
         }
     }
 }
