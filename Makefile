@@ -76,9 +76,10 @@ IMAGE_TESTS :=
 # What every whole-image test is linked with.
 IMAGE_COMMON_SRCS :=
 
-# Checks of tools/ that count as one test each.
+# Checks that count as one test each.
 CHECKS := \
     --check includes='$(PYTHON) tools/check_includes.py' \
+    --check tools='env AVR_PREFIX=$(AVR) $(PYTHON) test/tools/test_tools.py' \
     --check pins='$(PYTHON) tools/check_pins.py' \
     --check budgets='$(MAKE) -s --no-print-directory budgets'
 
@@ -112,7 +113,7 @@ $(BUILD)/firmware/%.o: firmware/% $(BUILD)/firmware/flags
 	$(AVR)gcc $(AVR_CFLAGS) $(DEFS) -MMD -MP -c -o $@ $<
 
 $(BUILD)/sac.elf: $(FIRMWARE_OBJS) $(BUILD)/firmware/flags
-	$(AVR)gcc $(AVR_LDFLAGS) -Wl,-Map=$(BUILD)/sac.map -o $@ $(FIRMWARE_OBJS)
+	$(AVR)gcc $(AVR_LDFLAGS) -Wl,-Map=$(BUILD)/sac.map -o $@ $(FIRMWARE_OBJS) -lm
 
 $(BUILD)/sac.hex: $(BUILD)/sac.elf
 	$(AVR)objcopy -O ihex -j .text -j .data $< $@

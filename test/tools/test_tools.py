@@ -1,0 +1,261 @@
+#!/usr/bin/env python3
+"""Tests of the scripts in tools/: each must find the fault it is there for.
+
+Run from the top of the repository. AVR_PREFIX names the compiler (avr-).
+"""
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+TOP = pathlib.Path(__file__).resolve().parents[2]
+AVR = os.environ.get("AVR_PREFIX", "avr-")
+AVR = str(TOP / AVR) if "/" in AVR and not AVR.startswith("/") else AVR
+
+
+class ToolTest(unittest.TestCase):
+    """Runs scripts in an empty folder of their own."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def write(self, name, text):
+        """Writes a file below the folder."""
+        path = self.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    def tool(self, name, *arguments):
+        """Runs tools/<name> in the folder; returns (exit code, what it said)."""
+        done = subprocess.run(
+            [sys.executable, TOP / "tools" / name, *arguments],
+            cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False,
+        )
+        return done.returncode, done.stdout
+
+
+class Includes(ToolTest):
+    """tools/check_includes.py"""
+
+    def check(self, file, include):
+        """Returns the exit code for a file with that include line."""
+        for header in ("base/number.h", "motion/ramp.h", "queue/queue.h", "cli/line.h", "hal/usart.h", "settings.h"):
+            self.write(f"firmware/{header}", "")
+        self.write(f"firmware/{file}", f"#include {include}\n")
+        return self.tool("check_includes.py")[0]
+
+    def test_lower_folder_is_allowed(self):
+        self.assertEqual(0, self.check("queue/queue.c", '"motion/ramp.h"'))
+
+    def test_higher_folder_is_refused(self):
+        self.assertEqual(1, self.check("motion/ramp.c", '"queue/queue.h"'))
+
+    def test_sibling_is_refused(self):
+        self.write("firmware/net/packet.h", "")
+        self.assertEqual(1, self.check("motion/ramp.c", '"net/packet.h"'))
+
+    def test_hal_is_refused_outside_main(self):
+        self.assertEqual(1, self.check("cli/line.c", '"hal/usart.h"'))
+        self.assertEqual(0, self.check("cli/line.c", '"cli/line.h"'))
+        self.assertEqual(0, self.check("main.c", '"hal/usart.h"'))
+
+    def test_avr_headers_are_refused_outside_hal(self):
+        self.assertEqual(1, self.check("cli/line.c", "<avr/io.h>"))
+        self.assertEqual(0, self.check("cli/line.c", "<stdint.h>"))
+        self.assertEqual(0, self.check("hal/usart.c", "<avr/io.h>"))
+
+    def test_base_knows_no_settings(self):
+        self.assertEqual(1, self.check("base/number.c", '"settings.h"'))
+
+
+class Pins(ToolTest):
+    """tools/check_pins.py"""
+
+    def test_table_follows_the_pin_map(self):
+        board = self.write("board.h", 'POST(CLK, B, 2, "D10", OUT, "OC1B")\n')
+        self.write("README.md", "before\n<!-- pins -->\n<!-- /pins -->\nafter\n")
+        arguments = ("--board", board, "--readme", "README.md")
+        self.assertEqual(1, self.tool("check_pins.py", *arguments)[0])
+        self.assertEqual(0, self.tool("check_pins.py", *arguments, "--write")[0])
+        self.assertEqual(0, self.tool("check_pins.py", *arguments)[0])
+        self.write("board.h", 'POST(CLK, B, 1, "D9", OUT, "OC1A")\n')
+        self.assertEqual(1, self.tool("check_pins.py", *arguments)[0])
+
+
+class Image(ToolTest):
+    """tools/check_size.py and tools/check_stack.py"""
+
+    def build(self, source):
+        """Compiles and links a program."""
+        self.write("t.c", source)
+        for step in (["-Os", "-fstack-usage", "-c", "t.c", "-o", "t.o"], ["t.o", "-o", "t.elf"]):
+            subprocess.run([f"{AVR}gcc", "-mmcu=atmega328p", *step], cwd=self.folder, check=True)
+
+    def size(self, flash, ram):
+        """Returns check_size.py's exit code for these budgets."""
+        return self.tool(
+            "check_size.py", "t.elf", "--size", f"{AVR}size", "--flash-budget", str(flash), "--ram-budget", str(ram)
+        )[0]
+
+    def stack(self, indirect=""):
+        """Returns check_stack.py's exit code and text."""
+        self.write("indirect", indirect)
+        return self.tool("check_stack.py", "t.elf", "--su", ".", "--prefix", AVR, "--indirect", "indirect")
+
+    def test_budgets_are_kept(self):
+        self.build("char a[100] = {1}; int main(void) { return a[3]; }")
+        self.assertEqual(0, self.size(1000, 100))
+        self.assertEqual(1, self.size(100, 100))
+        self.assertEqual(1, self.size(1000, 99))
+
+    def test_frames_add_up_along_the_deepest_path(self):
+        self.build(
+            "volatile char x; void g(volatile char *p) { volatile char b[30]; b[x] = *p; x = b[1]; }"
+            "__attribute__((noinline)) char f(void) { volatile char b[50]; b[x] = 1; g(b); return b[2]; }"
+            "int main(void) { return f() + f(); }"
+        )
+        code, text = self.stack()
+        self.assertEqual(0, code, text)
+        bound = int(text.split()[1])
+        # 2 bytes of return address each; g may be inlined, its frame stays
+        self.assertGreaterEqual(bound, 30 + 50 + 4)
+        self.assertLessEqual(bound, 30 + 50 + 30)
+
+    def test_interrupts_are_added(self):
+        main = "#include <avr/interrupt.h>\nvolatile char x; int main(void) { sei(); for (;;) x++; }\n"
+        bounds = []
+        for more in (
+            "",
+            "ISR(TIMER1_OVF_vect) { x++; }",
+            "ISR(TIMER1_OVF_vect) { x++; } ISR(TIMER0_OVF_vect) { x--; }",
+            "ISR(TIMER1_OVF_vect) { x++; } ISR(TIMER0_OVF_vect, ISR_NOBLOCK) { x--; }",
+        ):
+            self.build(main + more)
+            code, text = self.stack()
+            self.assertEqual(0, code, text)
+            bounds.append(int(text.split()[1]))
+        self.assertLess(bounds[0], bounds[1])
+        self.assertEqual(bounds[1], bounds[2], "interrupts that mask each other do not nest")
+        self.assertLess(bounds[2], bounds[3])
+
+    def test_too_deep_a_stack_is_refused(self):
+        self.build("volatile char x; int main(void) { volatile char b[2100]; b[x] = 1; for (;;) x = b[x]; }")
+        self.assertEqual(1, self.stack()[0])
+
+    def test_recursion_is_refused(self):
+        self.build(
+            "volatile char x; __attribute__((noinline)) int f(int a) { return a ? f(a - 1) * x + x : 0; }"
+            "int main(void) { return f(x); }"
+        )
+        code, text = self.stack()
+        self.assertEqual(1, code)
+        self.assertIn("recursion: f > f", text.replace("__vectors > main > ", "").replace("__vectors > ", ""))
+
+    def test_calls_through_pointers_must_be_listed(self):
+        self.build(
+            "typedef char fn(void); volatile char x; char one(void) { volatile char b[60]; b[x] = 1; return b[2]; }"
+            "fn *volatile p = one; int main(void) { return p() + x; }"
+        )
+        code, text = self.stack()
+        self.assertEqual(1, code)
+        self.assertIn("calls through a pointer", text)
+        code, text = self.stack("main: o?e")
+        self.assertEqual(0, code, text)
+        self.assertGreaterEqual(int(text.split()[1]), 60)
+
+
+class Trace(ToolTest):
+    """tools/trace.py"""
+
+    def setUp(self):
+        super().setUp()
+        rows = "".join(f"| HAR-00{n} | text | S | L1 | seen |\n" for n in (1, 2, 3))
+        self.write("docs/requirements.md", f"## HAR — Ramp\n\n{rows}\n## Annex A\n\n| HAR-004 | not a row |\n")
+        self.comment("/* HAR-001..HAR-002 */")
+        self.result("PASS")
+
+    def comment(self, comment):
+        """Writes the test with that comment."""
+        self.write("test/t.c", f"{comment}\nstatic void test_a(void)\n{{\n}}\n")
+
+    def result(self, result):
+        """Writes the test's result."""
+        self.write("build/test-results/t.txt", f"test/t.c:2:test_a:{result}\n")
+
+    def count(self, number):
+        """Writes the number that must be reached."""
+        self.write("docs/trace-count", f"{number}\n")
+
+    def test_range_is_counted(self):
+        code, text = self.tool("trace.py")
+        self.assertEqual(0, code)
+        self.assertIn("2 of 3 requirements", text)
+        self.assertIn("HAR-002  test_a", text)
+
+    def test_failed_test_shows_nothing(self):
+        self.result("FAIL: expected 1")
+        self.assertIn("0 of 3 requirements", self.tool("trace.py")[1])
+
+    def test_unknown_requirement_is_an_error(self):
+        self.comment("/* HAR-004 */")
+        self.assertEqual(1, self.tool("trace.py")[0])
+
+    def test_fall_is_an_error(self):
+        self.count(3)
+        self.assertEqual(1, self.tool("trace.py", "--raise")[0])
+
+    def test_rise_is_kept(self):
+        self.count(1)
+        self.assertEqual(0, self.tool("trace.py", "--raise")[0])
+        self.assertEqual("2\n", (self.folder / "docs/trace-count").read_text(encoding="utf-8"))
+
+    def test_comment_must_stand_directly_above(self):
+        self.comment("/* HAR-001 */\nint x;")
+        self.assertIn("0 of 3 requirements", self.tool("trace.py")[1])
+
+
+class Runner(ToolTest):
+    """tools/run_tests.py"""
+
+    def run_script(self, script):
+        """Runs a shell script as a Unity binary; returns the exit code and the last line."""
+        path = self.write("unit/test_x", f"#!/bin/sh\n{script}\n")
+        path.chmod(0o755)
+        code, text = self.tool("run_tests.py", "--unity", "unit/test_x", "--check", "good=true", "--timeout", "1")
+        return code, text.splitlines()[-1]
+
+    def test_totals_are_summed(self):
+        self.assertEqual((0, "6 passed, 0 failed"), self.run_script("echo 5 Tests 0 Failures 0 Ignored"))
+
+    def test_ignored_is_not_passed(self):
+        self.assertEqual((0, "4 passed, 0 failed"), self.run_script("echo 5 Tests 0 Failures 2 Ignored"))
+
+    def test_failures_fail(self):
+        self.assertEqual((1, "4 passed, 2 failed"), self.run_script("echo 5 Tests 2 Failures 0 Ignored; exit 2"))
+
+    def test_crash_fails(self):
+        self.assertEqual((1, "1 passed, 1 failed"), self.run_script("kill -SEGV $$"))
+
+    def test_crash_after_the_sum_fails(self):
+        self.assertEqual(
+            (1, "6 passed, 1 failed"), self.run_script("echo 5 Tests 0 Failures 0 Ignored; kill -ABRT $$")
+        )
+
+    def test_no_test_fails(self):
+        self.assertEqual((1, "1 passed, 1 failed"), self.run_script("echo 0 Tests 0 Failures 0 Ignored"))
+
+    def test_hang_fails(self):
+        self.assertEqual((1, "1 passed, 1 failed"), self.run_script("exec sleep 60"))
+
+    def test_missing_binary_fails(self):
+        code, text = self.tool("run_tests.py", "--unity", "none", "--check", "bad=false")
+        self.assertEqual((1, "0 passed, 2 failed"), (code, text.splitlines()[-1]))
+
+
+if __name__ == "__main__":
+    unittest.main()
