@@ -4,8 +4,11 @@
 
 BOARD_SRCS += $(addprefix test/board/, board.c events.c extint.c image.c irq.c measures.c pins.c registers.c \
     simavr_glue.c timer.c timer16.c timer8.c timers.c)
-BOARD_TESTS += test_board_timers
-BOARD_PROGRAMS += remote irq_order masked crash
+BOARD_TESTS += test_board_core test_board_timers
+BOARD_PROGRAMS += remote irq_order masked crash segments
 BOARD_CFLAGS += -Itest/board
 # simavr's static library; whatever the board defines itself stays out of the link (simavr_glue.c).
 BOARD_LIBS += -l:libsimavr.a -lelf -lm -lpthread
+
+# Linked as the firmware is, with the segment ring alone in front of .data.
+$(BUILD)/board/programs/segments.elf: AVR_MCU += -Wl,--section-start=.segments=0x800100 -Wl,-Tdata=0x800200
