@@ -134,6 +134,16 @@ class Walker:
             raise Unbounded(f"{caller}: no function matches {' '.join(patterns)}")
         return [self.image.address(n) for n in sorted(names)]
 
+    def shared_prologue(self, address, target):
+        """Returns the bytes that -mcall-prologues' common prologue takes: its pushes, and the frame in r27:r26."""
+        pushes = sum(1 for a in self.image.span(target) if a >= target and self.image.code[a][0] == "push")
+        frame = {}
+        for before in [a for a in self.image.span(address) if a < address][-8:]:
+            mnemonic, operands, _ = self.image.code[before]
+            if mnemonic == "ldi":
+                frame[operands[0]] = constant(operands[1])
+        return pushes + frame["r26"] + 256 * frame["r27"]
+
     def walk(self, entry):
         """Follows all paths from an entry point. State: depth, and the depth that Y stands for (or None)."""
         code, following = self.image.code, self.image.next
@@ -193,6 +203,12 @@ class Walker:
                 elif mnemonic == "sei":
                     self.lets_interrupts_in.add(entry)
                 elif mnemonic in ("jmp", "rjmp"):
+                    if self.image.name(target) == "__prologue_saves__":
+                        depth += self.shared_prologue(address, target)
+                        y_depth = depth
+                        target = after  # where it comes back to
+                    elif self.image.name(target) == "__epilogue_restores__":
+                        break
                     if self.image.name(target).startswith("__tablejump"):
                         # A switch's table: every case of this function that nothing else leads to.
                         for case in sorted(set(self.image.span(address)) - set(seen)):
