@@ -14,7 +14,8 @@
 
 /* The kernel reports "nobody there" (POLLHUP) only once the other end has been opened and closed: this does it, and
  * makes the port raw, as a serial port without line editing. */
-static bool open_and_close(const char *name) {
+static bool open_and_close(const char *name)
+{
     struct termios raw;
     int fd = open(name, O_RDWR | O_NOCTTY | O_CLOEXEC);
     bool ok;
@@ -30,7 +31,8 @@ static bool open_and_close(const char *name) {
     return close(fd) == 0 && ok;
 }
 
-static bool make_link(const char *target, const char *path) {
+static bool make_link(const char *target, const char *path)
+{
     struct stat old;
     char *temporary;
     bool ok;
@@ -54,7 +56,8 @@ static bool make_link(const char *target, const char *path) {
     return ok;
 }
 
-bool pty_open(pty_t *p, const char *link) {
+bool pty_open(pty_t *p, const char *link)
+{
     memset(p, 0, sizeof *p);
     p->fd = posix_openpt(O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
     if (p->fd < 0 || grantpt(p->fd) != 0 || unlockpt(p->fd) != 0 || ptsname_r(p->fd, p->name, sizeof p->name) != 0 ||
@@ -70,26 +73,36 @@ bool pty_open(pty_t *p, const char *link) {
     return true;
 }
 
-bool pty_opened(pty_t *p) {
+bool pty_opened(pty_t *p)
+{
     struct pollfd ask = {.fd = p->fd, .events = POLLIN};
-    bool was_open = p->open;
+    bool there, bytes, opened;
 
     poll(&ask, 1, 0);
-    /* Bytes without a program: it came and went between two looks. */
-    p->open = !(ask.revents & POLLHUP) || (ask.revents & POLLIN);
-    if (!p->open) {
+    there = !(ask.revents & POLLHUP);
+    bytes = ask.revents & POLLIN;
+    if (there) {
+        opened = !p->there;
+    } else {
+        /* Bytes, though nobody is there: left by the last program, or by one that came and went between two looks. */
+        opened = bytes && !p->there && !p->draining;
+        p->draining = bytes;
         p->backlog_count = 0;
     }
-    return p->open && !was_open;
+    p->there = there;
+    p->open = there || bytes;
+    return opened;
 }
 
-size_t pty_read(pty_t *p, uint8_t *bytes, size_t max) {
+size_t pty_read(pty_t *p, uint8_t *bytes, size_t max)
+{
     ssize_t got = read(p->fd, bytes, max);
 
     return got > 0 ? (size_t)got : 0;
 }
 
-static void flush(pty_t *p) {
+static void flush(pty_t *p)
+{
     ssize_t done = p->backlog_count > 0 ? write(p->fd, p->backlog, p->backlog_count) : 0;
 
     if (done > 0) {
@@ -98,8 +111,9 @@ static void flush(pty_t *p) {
     }
 }
 
-void pty_write(pty_t *p, const uint8_t *bytes, size_t count, bool wait) {
-    if (!p->open) {
+void pty_write(pty_t *p, const uint8_t *bytes, size_t count, bool wait)
+{
+    if (!p->there) {
         return;
     }
     if (count > PTY_BACKLOG_BYTES - p->backlog_count) {
@@ -116,7 +130,8 @@ void pty_write(pty_t *p, const uint8_t *bytes, size_t count, bool wait) {
     }
 }
 
-void pty_close(pty_t *p) {
+void pty_close(pty_t *p)
+{
     if (p->link != NULL) {
         char target[sizeof p->name];
         ssize_t length = readlink(p->link, target, sizeof target);

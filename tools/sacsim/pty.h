@@ -19,7 +19,9 @@ typedef struct {
     int fd;
     char name[64];    /* e.g. /dev/pts/3 */
     const char *link; /* NULL: none */
-    bool open;        /* by a program at the other end */
+    bool there;       /* a program has the port open */
+    bool draining;    /* it has gone, what it sent is still being read */
+    bool open;        /* there is somebody to read from */
     size_t backlog_count;
     uint8_t backlog[PTY_BACKLOG_BYTES]; /* sent by the board, not yet taken by the pseudo terminal */
 } pty_t;
