@@ -1,5 +1,7 @@
-/* What the cross-check types. Factory settings: 200 steps a revolution, full step, slow speed 10 RPM, 38,400 Bd.
+/* What the cross-check types. Factory settings: 200 steps a revolution, full step, slow speed 10 RPM, pulses of 2 us,
+ * 38,400 Bd. The image `fine` (crosscheck.mk) has 8 microsteps and pulses of 1 us.
  *
+ * image    the image, if it is not the firmware as it is delivered
  * name     the row of the table
  * typed    [milliseconds after the first line may be typed, bytes]
  * pulses   how many pulses each start from standstill must make, in order; within one of them intervals are compared
@@ -30,10 +32,12 @@ export const cases = [
     { name: 'cruise vc100 through ramps', typed: [[0, 'm6000vc100a10d10\r']], pulses: [6000], ms: 1300 },
     { name: 'cruise vc20', typed: [[0, 'm20000vc20a999d999\r']], pulses: [20000], ms: 450 },
     { name: 'cruise vc3', typed: [[0, 'm100000vc3a999d999\r']], pulses: [100000], ms: 350 },
-    { name: 'cruise vc2', typed: [[0, 'm100000vc2a999d999\r']], pulses: [100000], ms: 250 },
     { name: 'long, 5 rev/s', typed: [[0, 'm6000v300a2d2\r']], pulses: [6000], ms: 6800 },
     { name: 'stop with prejudice, then a start', typed: [[0, 'm2000v150a10d10\r'], [401, 'S\r'], [450, 'm50\r']], pulses: [ANY, 50], ms: 900 },
     { name: 'stop with grace, then a start', typed: [[0, 'm2000v150a10d10\r'], [401, 's\r'], [900, 'm50\r']], pulses: [ANY, 50], ms: 1400 },
     { name: 'next with grace', typed: [[0, 'm2000v150a5d5\r'], [20, 'm-50\r'], [501, 'n\r']], pulses: [ANY], ms: 1600 },
     { name: 'next with prejudice', typed: [[0, 'm2000v150a5d5\r'], [20, 'm50\r'], [501, 'N\r']], pulses: [ANY], ms: 1200 },
+    { image: 'fine', name: '8 microsteps, cruise 2 us', typed: [[0, 'm10000vc16a999d999\r']], pulses: [80000], ms: 250 },
+    { image: 'fine', name: '8 microsteps, harmonic', typed: [[0, 'm300v200a2d3\r']], pulses: [2400], ms: 1500 },
+    { image: 'fine', name: '8 microsteps, linear', typed: [[0, 'm-200l1v300a200d100\r']], pulses: [1600], ms: 800 },
 ];

@@ -1,7 +1,8 @@
 /* Runs one image in avr8js and on the board, and compares every rising edge of clk.
  *
- * Usage:   crosscheck.mjs [--case text] image.hex image.elf probe.hex probe.elf board_edges folder
- * Needs:   Node 20; the files named; the folder takes scripts and edge lists.
+ * Usage:   crosscheck.mjs [--case text] image folder
+ * Needs:   Node 20; <image>.hex and .elf; in the folder board_edges, probe and fine/sac (each .hex and .elf), made by
+ *          crosscheck.mk. Scripts and edge lists of the run go there too.
  * Errors:  exit status 1 when a case fails, 2 when nothing could be compared.
  * What is compared, within which bounds, and why: docs/crosscheck.md. */
 import { spawn } from 'node:child_process';
@@ -21,10 +22,12 @@ const here = dirname(fileURLToPath(import.meta.url));
 const hex = (text) => Buffer.from(text, 'latin1').toString('hex');
 
 /* Starts the board on a script; the promise gives { edges: [{ cycle, dir }], text }. */
-function startBoard({ tool, elf, typed, untilCycle, stem }) {
+function startBoard({ image, folder, name, typed, untilCycle }) {
+    const tool = join(folder, 'board_edges');
+    const stem = join(folder, name);
     const orders = typed.map(({ cycle, text }) => `type ${cycle} ${hex(text)}\n`);
     writeFileSync(`${stem}.script`, `${orders.join('')}end ${untilCycle}\n`);
-    const child = spawn(tool, [elf, `${stem}.script`, `${stem}.edges`], { stdio: ['ignore', 'inherit', 'inherit'] });
+    const child = spawn(tool, [`${image}.elf`, `${stem}.script`, `${stem}.edges`], { stdio: ['ignore', 'inherit', 'inherit'] });
     return new Promise((resolve, reject) => {
         child.on('error', reject);
         child.on('exit', (status) => {
@@ -60,17 +63,17 @@ function probeTrains() {
 async function runBoth(options) {
     const board = startBoard(options);
     board.catch(() => {}); /* reported where it is awaited */
-    const witness = runWitness(options);
+    const witness = runWitness({ ...options, hexPath: `${options.image}.hex` });
     return { witness, board: await board };
 }
 
 /* The probe: avr8js and the board, each against the datasheet. */
-async function runProbe({ hexPath, elf, tool, folder }) {
+async function runProbe(folder) {
     const trains = probeTrains();
     const edges = trains.flat().map((cycle) => ({ cycle, dir: 0 }));
     const counts = trains.map((train) => train.length);
     const { witness, board } = await runBoth({
-        hexPath, elf, tool, typed: [], untilCycle: PROBE_CYCLES, stem: join(folder, 'probe'),
+        image: join(folder, 'probe'), folder, name: 'probe', typed: [], untilCycle: PROBE_CYCLES,
     });
     const asWitness = { edges: board.edges.map(({ cycle, dir }) => ({ exact: cycle, raw: cycle, dir })) };
     const rows = [
@@ -84,11 +87,11 @@ async function runProbe({ hexPath, elf, tool, folder }) {
     return rows;
 }
 
-async function runCase(item, number, { hexPath, elf, tool, folder }) {
+async function runCase(item, number, image, folder) {
     const at = (ms) => Math.round((FIRST_LINE_MS + ms) * CYCLES_PER_MS);
     const typed = item.typed.map(([ms, text]) => ({ cycle: at(ms), text }));
     const { witness, board } = await runBoth({
-        hexPath, elf, tool, typed, untilCycle: at(item.ms), stem: join(folder, `case${number}`),
+        image, folder, name: `case${number}`, typed, untilCycle: at(item.ms),
     });
     const row = compare(item.name, witness, board, item.pulses);
     if (witness.text !== board.text) {
@@ -115,11 +118,12 @@ function print(row) {
 
 async function main(args) {
     const only = args[0] === '--case' ? args.splice(0, 2)[1] : '';
-    const [hexPath, elf, probeHex, probeElf, tool, folder] = args;
+    const [delivered, folder] = args;
     if (!folder) {
-        console.error('usage: crosscheck.mjs [--case text] image.hex image.elf probe.hex probe.elf board_edges folder');
+        console.error('usage: crosscheck.mjs [--case text] image folder');
         return 2;
     }
+    const images = { delivered, fine: join(folder, 'fine', 'sac') };
     console.log('Rising edges of clk, avr8js against the board; greatest differences in cycles of 62.5 ns.');
     console.log(COLUMNS.map(([title, width], i) => (i ? title.padStart(width) : title.padEnd(width))).join('  '));
     let failed = 0;
@@ -129,9 +133,9 @@ async function main(args) {
         if (row.faults.length) failed++;
         else passed++;
     };
-    for (const row of await runProbe({ hexPath: probeHex, elf: probeElf, tool, folder })) count(row);
+    for (const row of await runProbe(folder)) count(row);
     for (const [index, item] of cases.entries())
-        if (item.name.includes(only)) count(await runCase(item, index + 1, { hexPath, elf, tool, folder }));
+        if (item.name.includes(only)) count(await runCase(item, index + 1, images[item.image ?? 'delivered'], folder));
     console.log(`${passed} passed, ${failed} failed`);
     return failed ? 1 : 0;
 }

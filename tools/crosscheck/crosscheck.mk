@@ -1,10 +1,16 @@
-# What the cross-check needs besides the firmware: the board's half and the probe. Read by tools/crosscheck/run.sh after
-# the Makefile, whose variables it uses.
+# What the cross-check needs: the firmware, the board's half, the probe and the image `fine`. Read by
+# tools/crosscheck/run.sh after the Makefile, whose variables it uses.
 
 CROSSCHECK := $(BUILD)/crosscheck
 
 .PHONY: crosscheck-parts
-crosscheck-parts: $(BUILD)/sac.hex $(CROSSCHECK)/board_edges $(CROSSCHECK)/probe.hex
+crosscheck-parts: $(BUILD)/sac.hex $(CROSSCHECK)/board_edges $(CROSSCHECK)/probe.hex crosscheck-fine
+
+# The same sources with 8 microsteps and pulses of 1 us, for periods of 2 us.
+.PHONY: crosscheck-fine
+crosscheck-fine:
+	@$(MAKE) -s --no-print-directory -f Makefile BUILD=$(CROSSCHECK)/fine \
+	    DEFS='-DSETTINGS_USTEP=3 -DSETTINGS_PULSE_US=1' $(CROSSCHECK)/fine/sac.hex
 
 $(CROSSCHECK)/board_edges: tools/crosscheck/board_edges.c $(BOARD_LIB) test/board/board.h
 	@mkdir -p $(@D)

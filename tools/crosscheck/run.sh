@@ -32,5 +32,4 @@ fi
 
 ${MAKE:-make} -s -f Makefile -f $here/crosscheck.mk crosscheck-parts
 node test/crosscheck/compare_test.mjs
-exec node $here/crosscheck.mjs "$@" "$out/sac.hex" "$out/sac.elf" \
-    "$out/crosscheck/probe.hex" "$out/crosscheck/probe.elf" "$out/crosscheck/board_edges" "$out/crosscheck"
+exec node $here/crosscheck.mjs "$@" "$out/sac" "$out/crosscheck"
