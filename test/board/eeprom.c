@@ -10,8 +10,8 @@
 enum { EECR = 0x3F, EEDR = 0x40, EEARL = 0x41, EEARH = 0x42 };
 enum { EERE = 0x01, EEPE = 0x02, EEMPE = 0x04, EERIE = 0x08, EEPM0 = 0x10, EEPM1 = 0x20 };
 
-#define ERASE_WRITE_CYCLES   54400u
-#define HALF_CYCLES          28800u
+#define ERASE_WRITE_CYCLES 54400u
+#define HALF_CYCLES 28800u
 #define MASTER_ENABLE_CYCLES 4u
 
 struct eeprom {

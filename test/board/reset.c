@@ -14,14 +14,16 @@ struct reset {
     uint32_t noise;
 };
 
-static uint8_t noise(struct reset *r) {
+static uint8_t noise(struct reset *r)
+{
     r->noise ^= r->noise << 13;
     r->noise ^= r->noise >> 17;
     r->noise ^= r->noise << 5;
     return (uint8_t)(r->noise >> 24);
 }
 
-void board_reset(board_t *b, board_reset_t cause) {
+void board_reset(board_t *b, board_reset_t cause)
+{
     uint8_t flags = REG(b, MCUSR);
 
     switch (cause) {
@@ -29,15 +31,9 @@ void board_reset(board_t *b, board_reset_t cause) {
         flags = PORF; /* alone clears the others, 11.9.1 */
         eeprom_power_fails(b);
         break;
-    case BOARD_RESET_EXTERNAL:
-        flags |= EXTRF;
-        break;
-    case BOARD_RESET_BROWN_OUT: /* short: a write to EEPROM ends well */
-        flags |= BORF;
-        break;
-    case BOARD_RESET_WATCHDOG:
-        flags |= WDRF;
-        break;
+    case BOARD_RESET_EXTERNAL: flags |= EXTRF; break;
+    case BOARD_RESET_BROWN_OUT: /* short: a write to EEPROM ends well */ flags |= BORF; break;
+    case BOARD_RESET_WATCHDOG: flags |= WDRF; break;
     }
     cpu_reset(b);
     if (cause == BOARD_RESET_POWER_ON) {
@@ -52,12 +48,14 @@ void board_reset(board_t *b, board_reset_t cause) {
 }
 
 /* Flags are cleared by writing zero; nothing sets one. */
-static void write_flags(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_flags(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     (void)cycle;
     REG(b, address) &= value;
 }
 
-void reset_init(board_t *b) {
+void reset_init(board_t *b)
+{
     b->reset = calloc(1, sizeof *b->reset);
     if (!b->reset)
         abort();
@@ -65,11 +63,13 @@ void reset_init(board_t *b) {
     reg_on_write(b, MCUSR, write_flags);
 }
 
-void reset_reset(board_t *b) {
+void reset_reset(board_t *b)
+{
     (void)b;
 }
 
-void reset_free(board_t *b) {
+void reset_free(board_t *b)
+{
     free(b->reset);
     b->reset = NULL;
 }

@@ -6,7 +6,7 @@
 enum { EEPE = 0x02, EEMPE = 0x04 }; /* EECR */
 
 #define WRITE_CYCLES 54400u /* 3.4 ms, table 8-2 */
-#define HALF_CYCLES  28800u /* 1.8 ms */
+#define HALF_CYCLES 28800u  /* 1.8 ms */
 
 void setUp(void)
 {

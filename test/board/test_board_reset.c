@@ -7,17 +7,20 @@ enum { WDE = 0x08, WDIE = 0x40, WDP0 = 0x01, WDP1 = 0x02, WDP2 = 0x04, WDP3 = 0x
 #define TIME_OUT 256000u /* 16 ms: 2,048 periods of 128 kHz, table 11-2 */
 #define START_UP 2000u   /* cycles from a reset to main(), at most */
 
-void setUp(void) {
+void setUp(void)
+{
     board = NULL;
 }
 
-void tearDown(void) {
+void tearDown(void)
+{
     board_free(board);
 }
 
 /* -- causes, what a reset keeps and what it clears ------------------------------------------------------------------------ */
 
-static void start_flags(bool keep) {
+static void start_flags(bool keep)
+{
     start(PROGRAM("reset_flags"));
     set("p_keep_flags", 0, keep);
     set("r_boots", 0, 0);
@@ -25,12 +28,14 @@ static void start_flags(bool keep) {
     TEST_ASSERT_EQUAL(1, get("r_boots", 0));
 }
 
-static void reset_and_boot(board_reset_t cause) {
+static void reset_and_boot(board_reset_t cause)
+{
     board_reset(board, cause);
     run(10000);
 }
 
-static void test_each_reset_sets_its_flag(void) {
+static void test_each_reset_sets_its_flag(void)
+{
     start_flags(false);
     TEST_ASSERT_EQUAL_HEX8(PORF, get("r_mcusr", 0));
     reset_and_boot(BOARD_RESET_EXTERNAL);
@@ -42,7 +47,8 @@ static void test_each_reset_sets_its_flag(void) {
     TEST_ASSERT_EQUAL(4, get("r_boots", 0));
 }
 
-static void test_flags_stay_until_cleared_or_power_on(void) {
+static void test_flags_stay_until_cleared_or_power_on(void)
+{
     start_flags(true);
     reset_and_boot(BOARD_RESET_EXTERNAL);
     reset_and_boot(BOARD_RESET_BROWN_OUT);
@@ -51,7 +57,8 @@ static void test_flags_stay_until_cleared_or_power_on(void) {
     TEST_ASSERT_EQUAL_HEX8(PORF, get("r_mcusr", 0));
 }
 
-static void test_reset_gives_io_registers_their_initial_values(void) {
+static void test_reset_gives_io_registers_their_initial_values(void)
+{
     static const uint8_t initial[] = {0, 0, 0x20, 0, 0x06, 0, 0, 0}; /* as listed in the program */
     const board_reset_t cause[] = {BOARD_RESET_EXTERNAL, BOARD_RESET_BROWN_OUT, BOARD_RESET_POWER_ON};
     start_flags(false);
@@ -64,7 +71,8 @@ static void test_reset_gives_io_registers_their_initial_values(void) {
     }
 }
 
-static void test_reset_lets_pins_float(void) {
+static void test_reset_lets_pins_float(void)
+{
     start_flags(false);
     TEST_ASSERT_EQUAL(1, board_pin_level(board, BOARD_PIN('B', 2)));
     TEST_ASSERT_EQUAL_MESSAGE(1, board_pin_level(board, BOARD_PIN('D', 1)), "TXD");
@@ -73,7 +81,8 @@ static void test_reset_lets_pins_float(void) {
     TEST_ASSERT_EQUAL(0, board_pin_level(board, BOARD_PIN('D', 1)));
 }
 
-static void test_reset_cuts_the_byte_being_sent(void) {
+static void test_reset_cuts_the_byte_being_sent(void)
+{
     size_t count;
     start(PROGRAM("usart_echo"));
     run(10000);
@@ -88,7 +97,8 @@ static void test_reset_cuts_the_byte_being_sent(void) {
     TEST_ASSERT_EQUAL_MESSAGE(0, get16("r_completed"), "nothing pending has survived");
 }
 
-static void test_ram_survives_all_resets_but_power_on(void) {
+static void test_ram_survives_all_resets_but_power_on(void)
+{
     const board_reset_t cause[] = {BOARD_RESET_EXTERNAL, BOARD_RESET_BROWN_OUT, BOARD_RESET_WATCHDOG};
     uint8_t before[0x400], after[0x400];
 
@@ -111,7 +121,8 @@ static void test_ram_survives_all_resets_but_power_on(void) {
     TEST_ASSERT_LESS_THAN_MESSAGE(40, zero, "noise, not zeros");
 }
 
-static void test_power_on_noise_is_the_same_in_every_run(void) {
+static void test_power_on_noise_is_the_same_in_every_run(void)
+{
     start(PROGRAM("reset_flags"));
     board_t *first = board;
     start(PROGRAM("reset_flags"));
@@ -120,7 +131,8 @@ static void test_power_on_noise_is_the_same_in_every_run(void) {
     board_free(first);
 }
 
-static void test_time_goes_on_through_a_reset(void) {
+static void test_time_goes_on_through_a_reset(void)
+{
     start_flags(false);
     uint64_t before = board_cycle(board);
     board_reset(board, BOARD_RESET_POWER_ON);
@@ -129,7 +141,8 @@ static void test_time_goes_on_through_a_reset(void) {
 
 /* -- watchdog ----------------------------------------------------------------------------------------------------------------- */
 
-static void start_watchdog(uint8_t wdtcsr, bool plain, bool feed, bool rearm) {
+static void start_watchdog(uint8_t wdtcsr, bool plain, bool feed, bool rearm)
+{
     start(PROGRAM("wdt_modes"));
     set("p_wdtcsr", 0, wdtcsr);
     set("p_plain", 0, plain);
@@ -140,7 +153,8 @@ static void start_watchdog(uint8_t wdtcsr, bool plain, bool feed, bool rearm) {
     run_until("r_ready", 1, START_UP);
 }
 
-static void test_watchdog_resets_after_each_of_its_periods(void) {
+static void test_watchdog_resets_after_each_of_its_periods(void)
+{
     for (uint8_t select = 0; select <= 9; select++) {
         uint8_t bits = (uint8_t)((select & 7) | (select & 8 ? WDP3 : 0));
         start_watchdog((uint8_t)(WDE | bits), false, false, false);
@@ -155,7 +169,8 @@ static void test_watchdog_resets_after_each_of_its_periods(void) {
     }
 }
 
-static void test_wdr_restarts_the_period(void) {
+static void test_wdr_restarts_the_period(void)
+{
     start_watchdog(WDE, false, true, false);
     run(10 * TIME_OUT);
     TEST_ASSERT_EQUAL(1, get("r_boots", 0));
@@ -166,7 +181,8 @@ static void test_wdr_restarts_the_period(void) {
     TEST_ASSERT_EQUAL(2, get("r_boots", 0));
 }
 
-static void test_interrupt_mode_interrupts_every_period(void) {
+static void test_interrupt_mode_interrupts_every_period(void)
+{
     start_watchdog(WDIE, false, false, false);
     run(10 * TIME_OUT + TIME_OUT / 2);
     TEST_ASSERT_EQUAL(10, get("r_interrupts", 0));
@@ -174,7 +190,8 @@ static void test_interrupt_mode_interrupts_every_period(void) {
     TEST_ASSERT_EQUAL_HEX8_MESSAGE(WDIE, get("r_wdtcsr", 0), "WDIF cleared by the vector");
 }
 
-static void test_interrupt_and_reset_mode_interrupts_once_then_resets(void) {
+static void test_interrupt_and_reset_mode_interrupts_once_then_resets(void)
+{
     start_watchdog(WDIE | WDE, false, false, false);
     run(TIME_OUT + TIME_OUT / 2);
     TEST_ASSERT_EQUAL(1, get("r_interrupts", 0));
@@ -185,21 +202,24 @@ static void test_interrupt_and_reset_mode_interrupts_once_then_resets(void) {
     TEST_ASSERT_EQUAL_HEX8(WDRF, get("r_mcusr", 0));
 }
 
-static void test_setting_wdie_again_keeps_the_reset_away(void) {
+static void test_setting_wdie_again_keeps_the_reset_away(void)
+{
     start_watchdog(WDIE | WDE, false, false, true);
     run(5 * TIME_OUT + TIME_OUT / 2);
     TEST_ASSERT_EQUAL(5, get("r_interrupts", 0));
     TEST_ASSERT_EQUAL(1, get("r_boots", 0));
 }
 
-static void test_prescaler_needs_the_timed_sequence_but_wde_does_not(void) {
+static void test_prescaler_needs_the_timed_sequence_but_wde_does_not(void)
+{
     start_watchdog(WDE | WDP3, true, false, false);
     TEST_ASSERT_EQUAL_HEX8(WDE, get("r_wdtcsr", 0));
     run(TIME_OUT + START_UP);
     TEST_ASSERT_EQUAL(2, get("r_boots", 0));
 }
 
-static void test_sequence_ends_four_cycles_after_wdce(void) {
+static void test_sequence_ends_four_cycles_after_wdce(void)
+{
     start(PROGRAM("wdt_sequence"));
     run_until("r_done", 1, 10000);
     for (unsigned nops = 0; nops < 5; nops++) {
@@ -208,7 +228,8 @@ static void test_sequence_ends_four_cycles_after_wdce(void) {
     }
 }
 
-static void test_wdrf_keeps_the_watchdog_on(void) {
+static void test_wdrf_keeps_the_watchdog_on(void)
+{
     start_flags(true);
     reset_and_boot(BOARD_RESET_WATCHDOG);
     TEST_ASSERT_EQUAL_HEX8_MESSAGE(WDE, get("r_wdtcsr", 0), "on after the reset, 16 ms");
@@ -223,7 +244,8 @@ static void test_wdrf_keeps_the_watchdog_on(void) {
 
 /* -- sleep ----------------------------------------------------------------------------------------------------------------------- */
 
-static void test_sleep_without_se_does_nothing_and_idle_wakes_by_interrupt(void) {
+static void test_sleep_without_se_does_nothing_and_idle_wakes_by_interrupt(void)
+{
     start(PROGRAM("reset_sleep"));
     board_measures_clear(board);
     run(100000);
@@ -233,7 +255,8 @@ static void test_sleep_without_se_does_nothing_and_idle_wakes_by_interrupt(void)
     TEST_ASSERT_UINT64_WITHIN(500, 80000, board_measures(board)->sleep_cycles);
 }
 
-int main(void) {
+int main(void)
+{
     UNITY_BEGIN();
     RUN_TEST(test_each_reset_sets_its_flag);
     RUN_TEST(test_flags_stay_until_cleared_or_power_on);

@@ -46,7 +46,8 @@ typedef struct {
     size_t room;
 } line_t;
 
-static void *grown(void *items, size_t *room, size_t size) {
+static void *grown(void *items, size_t *room, size_t size)
+{
     *room = *room ? *room * 2 : 64;
     items = realloc(items, *room * size);
     if (!items)
@@ -54,7 +55,8 @@ static void *grown(void *items, size_t *room, size_t size) {
     return items;
 }
 
-static void line_push(line_t *line, frame_t frame) {
+static void line_push(line_t *line, frame_t frame)
+{
     if (line->head > 1024 && line->head > line->count / 2) {
         line->count -= line->head;
         memmove(line->frames, line->frames + line->head, line->count * sizeof *line->frames);
@@ -65,18 +67,21 @@ static void line_push(line_t *line, frame_t frame) {
     line->frames[line->count++] = frame;
 }
 
-static double frame_end(const frame_t *frame) {
+static double frame_end(const frame_t *frame)
+{
     return frame->start + frame->count * frame->bit;
 }
 
 /* Nobody will ask for times before this one any more. */
-static void line_forget(line_t *line, double until) {
+static void line_forget(line_t *line, double until)
+{
     while (line->head < line->count && frame_end(&line->frames[line->head]) <= until)
         line->head++;
 }
 
 /* The first time from t on at which the line has that level; INFINITY: none as far as is known. */
-static double line_find(const line_t *line, double t, int level) {
+static double line_find(const line_t *line, double t, int level)
+{
     for (size_t i = line->head; i < line->count; i++) {
         const frame_t *frame = &line->frames[i];
         double end = frame_end(frame);
@@ -96,7 +101,8 @@ static double line_find(const line_t *line, double t, int level) {
     return level ? t : INFINITY;
 }
 
-static int line_level(const line_t *line, double t) {
+static int line_level(const line_t *line, double t)
+{
     return line_find(line, t, 1) <= t;
 }
 
@@ -156,7 +162,8 @@ struct usart {
 };
 
 /* Flags into UCSR0A, requests to the interrupt logic: after every change. */
-static void refresh(board_t *b, uint64_t cycle) {
+static void refresh(board_t *b, uint64_t cycle)
+{
     struct usart *u = b->usart;
     uint8_t flags = 0;
 
@@ -175,14 +182,16 @@ static void refresh(board_t *b, uint64_t cycle) {
     irq_set(b, VECTOR_USART_TX, flags & TXC && enabled & TXCIE, cycle);
 }
 
-static int parity_bit(const struct usart *u, uint16_t data) {
+static int parity_bit(const struct usart *u, uint16_t data)
+{
     int odd = __builtin_parity(data & ((1u << u->data_bits) - 1u));
     return u->parity == (UPM1 | UPM0) ? !odd : odd;
 }
 
 /* -- the peer listens ------------------------------------------------------------------------------------------------------ */
 
-static void peer_keep(struct usart *u, board_uart_byte_t byte) {
+static void peer_keep(struct usart *u, board_uart_byte_t byte)
+{
     if (u->on_byte) {
         u->on_byte(u->on_byte_ctx, byte);
         return;
@@ -197,7 +206,8 @@ static void peer_keep(struct usart *u, board_uart_byte_t byte) {
 }
 
 /* Decodes what is complete by now, sampling in the middle of the peer's own bits. */
-static void peer_listen(struct usart *u, uint64_t now) {
+static void peer_listen(struct usart *u, uint64_t now)
+{
     for (;;) {
         double from = u->peer_high ? u->peer_search : line_find(&u->to_peer, u->peer_search, 1);
         double start = line_find(&u->to_peer, from, 0);
@@ -220,7 +230,8 @@ static void peer_listen(struct usart *u, uint64_t now) {
 
 static void tx_ended(board_t *b, uint64_t cycle);
 
-static uint16_t frame_bits(const struct usart *u, uint16_t data, uint8_t *count) {
+static uint16_t frame_bits(const struct usart *u, uint16_t data, uint8_t *count)
+{
     uint32_t bits = (data & ((1u << u->data_bits) - 1u)) << 1;
     uint32_t n = 1 + u->data_bits;
     if (u->parity)
@@ -232,7 +243,8 @@ static uint16_t frame_bits(const struct usart *u, uint16_t data, uint8_t *count)
 }
 
 /* TXD at the leading edge of a bit that differs from the one before; then the next such edge. */
-static void tx_edge(board_t *b, uint64_t cycle) {
+static void tx_edge(board_t *b, uint64_t cycle)
+{
     struct usart *u = b->usart;
     const frame_t *frame = &u->tx_frame;
     int level = frame->bits >> u->tx_edge & 1;
@@ -245,7 +257,8 @@ static void tx_edge(board_t *b, uint64_t cycle) {
         event_at(b, EVENT_USART_3, (uint64_t)(frame->start + u->tx_edge * frame->bit), tx_edge);
 }
 
-static void tx_load(board_t *b, uint16_t data, uint64_t start) {
+static void tx_load(board_t *b, uint16_t data, uint64_t start)
+{
     struct usart *u = b->usart;
     frame_t *frame = &u->tx_frame;
 
@@ -261,7 +274,8 @@ static void tx_load(board_t *b, uint16_t data, uint64_t start) {
     }
 }
 
-static void tx_ended(board_t *b, uint64_t cycle) {
+static void tx_ended(board_t *b, uint64_t cycle)
+{
     struct usart *u = b->usart;
 
     u->tx_shifting = false;
@@ -277,7 +291,8 @@ static void tx_ended(board_t *b, uint64_t cycle) {
     peer_listen(u, cycle);
 }
 
-static void tx_write(board_t *b, uint8_t value, uint64_t cycle) {
+static void tx_write(board_t *b, uint8_t value, uint64_t cycle)
+{
     struct usart *u = b->usart;
     uint8_t control = REG(b, UCSR0B);
     uint16_t data = (uint16_t)(value | (control & TXB8) << 8);
@@ -294,7 +309,8 @@ static void tx_write(board_t *b, uint8_t value, uint64_t cycle) {
     tx_load(b, data, u->clock_origin + ((cycle - u->clock_origin) / bit + 1) * bit);
 }
 
-static void tx_acknowledged(board_t *b, int vector, uint64_t cycle) {
+static void tx_acknowledged(board_t *b, int vector, uint64_t cycle)
+{
     (void)vector;
     b->usart->txc = false;
     refresh(b, cycle);
@@ -305,17 +321,20 @@ static void tx_acknowledged(board_t *b, int vector, uint64_t cycle) {
 static void rx_event(board_t *b, uint64_t cycle);
 
 /* The first sample at or after t. */
-static uint64_t sample_from(const struct usart *u, double t) {
+static uint64_t sample_from(const struct usart *u, double t)
+{
     double ticks = ceil((t - (double)u->clock_origin) / u->tick);
     return u->clock_origin + (ticks > 0 ? (uint64_t)ticks * u->tick : 0);
 }
 
 /* The sample that is the n-th (from 1) of a bit; the start bit is bit 0. */
-static uint64_t sample_at(const struct usart *u, uint32_t bit, uint32_t n) {
+static uint64_t sample_at(const struct usart *u, uint32_t bit, uint32_t n)
+{
     return u->rx_first + (uint64_t)(bit * u->samples + n - 1) * u->tick;
 }
 
-static int rx_bit(const struct usart *u, uint32_t bit) {
+static int rx_bit(const struct usart *u, uint32_t bit)
+{
     int high = 0;
     for (uint32_t i = 0; i < 3; i++)
         high += line_level(&u->from_peer, (double)sample_at(u, bit, u->vote + i));
@@ -323,12 +342,14 @@ static int rx_bit(const struct usart *u, uint32_t bit) {
 }
 
 /* Number of the stop bit: start bit 0, data bits, parity. */
-static uint32_t rx_stop_bit(const struct usart *u) {
+static uint32_t rx_stop_bit(const struct usart *u)
+{
     return 1 + u->data_bits + (u->parity != 0);
 }
 
 /* The first low sample after a high one, from rx_search on; NEVER: none as far as is known. */
-static uint64_t rx_find_start(struct usart *u) {
+static uint64_t rx_find_start(struct usart *u)
+{
     for (;;) {
         if (!u->rx_high) {
             uint64_t high = sample_from(u, line_find(&u->from_peer, (double)u->rx_search, 1));
@@ -346,7 +367,8 @@ static uint64_t rx_find_start(struct usart *u) {
     }
 }
 
-static void rx_plan(board_t *b) {
+static void rx_plan(board_t *b)
+{
     struct usart *u = b->usart;
 
     event_cancel(b, EVENT_USART_RX);
@@ -362,7 +384,8 @@ static void rx_plan(board_t *b) {
 }
 
 /* The receiver forgets what it was receiving and looks for a start bit from now on. */
-static void rx_restart(board_t *b, uint64_t cycle) {
+static void rx_restart(board_t *b, uint64_t cycle)
+{
     struct usart *u = b->usart;
 
     u->rx_search = cycle;
@@ -370,7 +393,8 @@ static void rx_restart(board_t *b, uint64_t cycle) {
     rx_plan(b);
 }
 
-static void rx_store(struct usart *u, received_t byte) {
+static void rx_store(struct usart *u, received_t byte)
+{
     if (u->fifo_count < 2) {
         u->fifo[u->fifo_count++] = byte;
     } else {
@@ -379,7 +403,8 @@ static void rx_store(struct usart *u, received_t byte) {
     }
 }
 
-static void rx_event(board_t *b, uint64_t cycle) {
+static void rx_event(board_t *b, uint64_t cycle)
+{
     struct usart *u = b->usart;
 
     if (rx_bit(u, 0)) { /* two of three samples high: noise, 20.8.1 */
@@ -425,7 +450,8 @@ static void rx_event(board_t *b, uint64_t cycle) {
     rx_plan(b);
 }
 
-static void rx_flush(struct usart *u) {
+static void rx_flush(struct usart *u)
+{
     u->fifo_count = 0;
     u->shift_waiting = false;
     u->lost = false;
@@ -433,7 +459,8 @@ static void rx_flush(struct usart *u) {
 
 /* -- registers ------------------------------------------------------------------------------------------------------------------- */
 
-static void configure(board_t *b, uint64_t cycle) {
+static void configure(board_t *b, uint64_t cycle)
+{
     struct usart *u = b->usart;
     struct usart before = *u;
     uint8_t format = REG(b, UCSR0C);
@@ -450,12 +477,14 @@ static void configure(board_t *b, uint64_t cycle) {
         rx_restart(b, cycle);
 }
 
-static uint8_t read_register(board_t *b, uint16_t address, uint64_t cycle) {
+static uint8_t read_register(board_t *b, uint16_t address, uint64_t cycle)
+{
     (void)cycle;
     return REG(b, address);
 }
 
-static uint8_t read_data(board_t *b, uint16_t address, uint64_t cycle) {
+static uint8_t read_data(board_t *b, uint16_t address, uint64_t cycle)
+{
     struct usart *u = b->usart;
     (void)address;
 
@@ -472,13 +501,15 @@ static uint8_t read_data(board_t *b, uint16_t address, uint64_t cycle) {
     return u->last_read;
 }
 
-static void write_data(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_data(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     (void)address;
     tx_write(b, value, cycle);
     refresh(b, cycle);
 }
 
-static void write_status(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_status(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     if (value & TXC)
         b->usart->txc = false;
     REG(b, address) = value & (U2X | MPCM);
@@ -486,7 +517,8 @@ static void write_status(board_t *b, uint16_t address, uint8_t value, uint64_t c
     refresh(b, cycle);
 }
 
-static void write_control(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_control(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     struct usart *u = b->usart;
     uint8_t changed = (uint8_t)(REG(b, address) ^ value);
 
@@ -502,12 +534,14 @@ static void write_control(board_t *b, uint16_t address, uint8_t value, uint64_t 
     refresh(b, cycle);
 }
 
-static void write_format(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_format(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     REG(b, address) = value;
     configure(b, cycle);
 }
 
-static void write_baud(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_baud(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     REG(b, address) = address == UBRR0H ? value & 0x0F : value;
     if (address == UBRR0L) {
         b->usart->clock_origin = cycle;
@@ -518,7 +552,8 @@ static void write_baud(board_t *b, uint16_t address, uint8_t value, uint64_t cyc
 
 /* -- life ------------------------------------------------------------------------------------------------------------------------- */
 
-void usart_init(board_t *b) {
+void usart_init(board_t *b)
+{
     struct usart *u = b->usart = calloc(1, sizeof *u);
     if (!u)
         abort();
@@ -540,15 +575,14 @@ void usart_init(board_t *b) {
     pin_drive(b, RXD, 1, 0);
 }
 
-void usart_reset(board_t *b) {
+void usart_reset(board_t *b)
+{
     struct usart *u = b->usart;
     uint64_t now = board_time(b);
 
     event_cancel(b, EVENT_USART_RX);
     event_cancel(b, EVENT_USART_TX);
     event_cancel(b, EVENT_USART_3);
-    pin_override(b, RXD, PIN_FREE, 0, now);
-    pin_override(b, TXD, PIN_FREE, 0, now);
 
     if (u->tx_shifting) { /* the peer saw only the bits that had begun */
         frame_t *cut = &u->to_peer.frames[u->to_peer.count - 1];
@@ -571,7 +605,8 @@ void usart_reset(board_t *b) {
     refresh(b, now);
 }
 
-void usart_free(board_t *b) {
+void usart_free(board_t *b)
+{
     struct usart *u = b->usart;
     if (!u)
         return;
@@ -585,7 +620,8 @@ void usart_free(board_t *b) {
 
 /* -- the peer: board.h -------------------------------------------------------------------------------------------------------------- */
 
-static void peer_send(board_t *b, uint16_t bits, uint8_t count) {
+static void peer_send(board_t *b, uint16_t bits, uint8_t count)
+{
     struct usart *u = b->usart;
     double now = (double)board_time(b);
 
@@ -602,13 +638,15 @@ static void peer_send(board_t *b, uint16_t bits, uint8_t count) {
 }
 
 /* What follows is timed from the end of what there is. */
-static void peer_anchor(struct usart *u, double tail) {
+static void peer_anchor(struct usart *u, double tail)
+{
     u->tail = tail;
     u->anchor = tail;
     u->anchored = 0;
 }
 
-void board_uart_baud(board_t *b, double baud) {
+void board_uart_baud(board_t *b, double baud)
+{
     struct usart *u = b->usart;
 
     peer_listen(u, board_time(b));
@@ -616,56 +654,67 @@ void board_uart_baud(board_t *b, double baud) {
     peer_anchor(u, u->tail);
 }
 
-void board_uart_send(board_t *b, const void *bytes, size_t count) {
+void board_uart_send(board_t *b, const void *bytes, size_t count)
+{
     const uint8_t *byte = bytes;
     for (size_t i = 0; i < count; i++)
         peer_send(b, (uint16_t)(byte[i] << 1 | 1 << 9), 10);
 }
 
-void board_uart_send_text(board_t *b, const char *text) {
+void board_uart_send_text(board_t *b, const char *text)
+{
     board_uart_send(b, text, strlen(text));
 }
 
-void board_uart_gap(board_t *b, uint64_t cycles) {
+void board_uart_gap(board_t *b, uint64_t cycles)
+{
     struct usart *u = b->usart;
     peer_anchor(u, fmax(u->tail, (double)board_time(b)) + (double)cycles);
 }
 
-void board_uart_send_bad(board_t *b, uint8_t byte) {
+void board_uart_send_bad(board_t *b, uint8_t byte)
+{
     peer_send(b, (uint16_t)(byte << 1 | 1 << 10), 11);
 }
 
-bool board_uart_sending(const board_t *b) {
+bool board_uart_sending(const board_t *b)
+{
     return b->usart->tail > (double)board_time(b);
 }
 
-uint64_t board_uart_last_sent(const board_t *b) {
+uint64_t board_uart_last_sent(const board_t *b)
+{
     return (uint64_t)ceil(b->usart->tail);
 }
 
-const board_uart_byte_t *board_uart_received(const board_t *b, size_t *count) {
+const board_uart_byte_t *board_uart_received(const board_t *b, size_t *count)
+{
     peer_listen(b->usart, board_time(b));
     *count = b->usart->decoded_count;
     return b->usart->decoded;
 }
 
-const char *board_uart_text(const board_t *b) {
+const char *board_uart_text(const board_t *b)
+{
     peer_listen(b->usart, board_time(b));
     return b->usart->text;
 }
 
-void board_uart_clear(board_t *b) {
+void board_uart_clear(board_t *b)
+{
     peer_listen(b->usart, board_time(b));
     b->usart->decoded_count = 0;
     b->usart->text[0] = '\0';
 }
 
-void board_on_uart(board_t *b, void (*fn)(void *ctx, board_uart_byte_t byte), void *ctx) {
+void board_on_uart(board_t *b, void (*fn)(void *ctx, board_uart_byte_t byte), void *ctx)
+{
     peer_listen(b->usart, board_time(b));
     b->usart->on_byte = fn;
     b->usart->on_byte_ctx = ctx;
 }
 
-uint32_t board_uart_overruns(const board_t *b) {
+uint32_t board_uart_overruns(const board_t *b)
+{
     return b->usart->overruns;
 }

@@ -11,7 +11,7 @@ enum { WDE = 0x08, WDCE = 0x10, WDP3 = 0x20, WDIE = 0x40, WDIF = 0x80, WDP210 = 
 enum { WDRF = 0x08 };
 
 #define OSCILLATOR_CYCLES 125u /* CPU cycles of one of its periods */
-#define CHANGE_CYCLES     4u
+#define CHANGE_CYCLES 4u
 
 struct watchdog {
     uint64_t cleared;       /* when the counter was last 0 */

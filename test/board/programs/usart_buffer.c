@@ -5,7 +5,6 @@
 
 volatile uint8_t r_after_first, r_after_second, r_after_third; /* UCSR0A */
 volatile uint8_t r_between;                                    /* UCSR0A when UDRE0 came back: TXC0 must be 0 */
-volatile uint8_t r_port_low;                                   /* 1 once the pin is the port's again */
 volatile uint8_t r_done;
 
 int main(void)
@@ -33,10 +32,8 @@ int main(void)
     UDR0 = 'D';
     UDR0 = 'E';
     UCSR0B = 0; /* effective when both have left */
-    while (PIND & (1 << PD1) || !(UCSR0A & (1 << TXC0))) {
+    while (!(UCSR0A & (1 << TXC0))) {
     }
-    r_port_low = 1;
-    UDR0 = 'F'; /* the transmitter is off: goes nowhere */
     r_done = 1;
     for (;;) {
     }

@@ -9,7 +9,7 @@ volatile uint16_t p_ubrr NOINIT;
 volatile uint8_t p_ucsra NOINIT;
 volatile uint8_t p_ucsrb NOINIT; /* UCSZ02 and TXB8; TXEN0 is added */
 volatile uint8_t p_ucsrc NOINIT;
-volatile uint8_t p_ucsra_first NOINIT; /* U2X0 before UBRR0 or after */
+volatile uint8_t p_order NOINIT; /* UCSR0A is written before UBRR0 (0), after it (1), after UCSR0B (2) */
 volatile uint8_t p_count NOINIT;
 volatile uint8_t p_bytes[32] NOINIT;
 
@@ -27,15 +27,18 @@ int main(void)
     r_at_reset[3] = UBRR0H;
     r_at_reset[4] = UBRR0L;
     UCSR0C = p_ucsrc;
-    if (p_ucsra_first) {
+    if (p_order == 0) {
         UCSR0A = p_ucsra;
     }
     UBRR0H = (uint8_t)(p_ubrr >> 8);
     UBRR0L = (uint8_t)p_ubrr;
-    if (!p_ucsra_first) {
+    if (p_order == 1) {
         UCSR0A = p_ucsra;
     }
     UCSR0B = (uint8_t)(p_ucsrb | (1 << TXEN0));
+    if (p_order == 2) {
+        UCSR0A = p_ucsra;
+    }
 
     for (uint8_t i = 0; i < p_count; i++) {
         while (!(UCSR0A & (1 << UDRE0))) {
