@@ -29,6 +29,7 @@ FIRMWARE_SRCS := \
     firmware/main.c \
     firmware/settings.c \
     firmware/base/number.c \
+    firmware/base/wide.S \
     firmware/base/status.c \
     firmware/motion/ramp.c \
     firmware/motion/profile.c \
@@ -76,10 +77,12 @@ IMAGE_TESTS :=
 # What every whole-image test is linked with.
 IMAGE_COMMON_SRCS :=
 
+# Tests written in Python.
+SCRIPT_TESTS := test/tools/test_tools.py test/sim/test_sacsim.py
+
 # Checks that count as one test each.
 CHECKS := \
     --check includes='$(PYTHON) tools/check_includes.py' \
-    --check tools='env AVR_PREFIX=$(AVR) $(PYTHON) test/tools/test_tools.py' \
     --check pins='$(PYTHON) tools/check_pins.py' \
     --check budgets='$(MAKE) -s --no-print-directory budgets'
 
@@ -92,7 +95,7 @@ CHECKS := \
 
 AVR_MCU := -mmcu=atmega328p
 AVR_WARNINGS := -Wall -Wextra -Wconversion -Wshadow -Wlogical-op -Wstrict-prototypes -Wstack-usage=128 -Werror
-AVR_CFLAGS := $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 -Os -g -ffunction-sections -fdata-sections -fshort-enums \
+AVR_CFLAGS := $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 -Os -g -mcall-prologues -ffunction-sections -fdata-sections -fshort-enums \
     -fstack-usage -Ifirmware $(AVR_WARNINGS)
 # The segment ring stands alone in the first 256 bytes of RAM, so that the step interrupt addresses it with one byte.
 AVR_LDFLAGS := $(AVR_MCU) -Wl,--gc-sections -mrelax -Wl,--section-start=.segments=0x800100 -Wl,-Tdata=0x800200
@@ -184,7 +187,6 @@ AVR_IMAGES := $(AVR_TESTS:%=$(BUILD)/avr/%.elf)
 BOARD_BINS := $(BOARD_TESTS:%=$(BUILD)/board/%)
 BOARD_IMAGES := $(BOARD_PROGRAMS:%=$(BUILD)/board/programs/%.elf)
 IMAGE_BINS := $(IMAGE_TESTS:%=$(BUILD)/image/%)
-RUN_TESTS := $(PYTHON) tools/run_tests.py --jobs $(JOBS)
 
 $(BUILD)/unity.o: $(UNITY)/unity.c
 	@mkdir -p $(@D)
@@ -203,7 +205,7 @@ $(HOST_BINS): $(BUILD)/host/%: test/host/%.c $$($$*_SRCS) $(BUILD)/unity-sanitiz
 # and read them from RAM.
 $(AVR_IMAGES): $(BUILD)/avr/%.elf: test/host/%.c $$($$*_SRCS) test/avr/report.c $(HOST_HEADERS) Makefile
 	@mkdir -p $(@D)
-	$(AVR)gcc $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 -Os -g -fshort-enums -ffunction-sections -fdata-sections \
+	$(AVR)gcc $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 -Os -g -mcall-prologues -fshort-enums -ffunction-sections -fdata-sections \
 	    -Wl,--gc-sections -UAVR -include test/avr/report.h -DUNITY_EXCLUDE_FLOAT $(TEST_INCLUDES) -o $@ \
 	    $(filter %.c,$^) $(UNITY)/unity.c
 
@@ -213,7 +215,7 @@ $(BUILD)/avr/run: test/avr/run.c $(BOARD_LIB) $(HOST_HEADERS)
 
 $(BOARD_IMAGES): $(BUILD)/board/programs/%.elf: $$(wildcard test/board/programs/$$*.[cS])
 	@mkdir -p $(@D)
-	$(AVR)gcc $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 -Os -g -Wall -Wextra -Werror -o $@ $<
+	$(AVR)gcc $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 -Os -g -mcall-prologues -Wall -Wextra -Werror -o $@ $<
 
 $(BOARD_BINS): $(BUILD)/board/%: test/board/%.c $(BUILD)/unity.o $(BOARD_LIB) $(HOST_HEADERS)
 	@mkdir -p $(@D)
@@ -229,39 +231,44 @@ $(IMAGE_BINS): $(BUILD)/image/%: test/image/%.c $(IMAGE_COMMON_SRCS) $$($$*_SRCS
 HOST_PARTS := $(HOST_BINS)
 BOARD_PARTS := $(BOARD_BINS) $(BOARD_IMAGES)
 IMAGE_PARTS := $(IMAGE_BINS) $(BUILD)/sac.hex
+SIM_PARTS := $(BUILD)/sacsim $(BUILD)/sac.elf
 AVR_PARTS := $(if $(AVR_TESTS),$(AVR_IMAGES) $(BUILD)/avr/run)
 
 .PHONY: test-parts
-test-parts: $(HOST_PARTS) $(BOARD_PARTS) $(IMAGE_PARTS) $(AVR_PARTS) $(if $(SACSIM_SRCS),$(BUILD)/sacsim)
+test-parts: $(HOST_PARTS) $(BOARD_PARTS) $(IMAGE_PARTS) $(AVR_PARTS) $(SIM_PARTS)
 
-# What cannot be built counts as a failed test, so building goes on after an error and the runner has the last word.
-build_parts = $(MAKE) -s -k -j$(JOBS) --no-print-directory $(1) || true
-unity_runs = $(foreach run,$(1),--unity $(run))
+# Building goes on after an error; that it failed counts as a failed check, and the runner has the last word.
+build_then_run = built=true; $(MAKE) -s -k -j$(JOBS) --no-print-directory $(1) || built=false; \
+    $(PYTHON) tools/run_tests.py --jobs $(JOBS) --check build=$$built --results $(BUILD)/$(2)
+test_runs = $(foreach run,$(1),--tests $(run))
+AVR_RUNS = $(foreach run,$(AVR_TESTS),--tests '$(BUILD)/avr/run $(BUILD)/avr/$(run).elf')
+# For scripts that may run in another folder.
+AVR_PATH := $(if $(findstring /,$(AVR)),$(abspath $(AVR)),$(AVR))
+TEST_ENV := env BUILD=$(BUILD) SACSIM=$(BUILD)/sacsim SAC_ELF=$(BUILD)/sac.elf AVR=$(AVR_PATH)
+SCRIPT_RUNS = $(foreach run,$(SCRIPT_TESTS),--tests '$(TEST_ENV) $(PYTHON) $(run)')
 
 .PHONY: test
 test: ## everything: builds, runs and sums up all tests and checks
-	@$(call build_parts,test-parts)
-	@$(RUN_TESTS) --results $(BUILD)/test-results $(call unity_runs,$(IMAGE_BINS) $(BOARD_BINS) $(HOST_BINS)) \
-	    $(foreach run,$(AVR_TESTS),--unity '$(BUILD)/avr/run $(BUILD)/avr/$(run).elf') \
-	    $(CHECKS) --check newer='$(MAKE) -s --no-print-directory newer' \
-	    $(if $(CI),--check crosscheck='tools/crosscheck/run.sh') \
+	@$(call build_then_run,test-parts,test-results) $(call test_runs,$(IMAGE_BINS) $(BOARD_BINS) $(HOST_BINS)) \
+	    $(AVR_RUNS) $(SCRIPT_RUNS) $(CHECKS) --check newer='$(MAKE) -s --no-print-directory newer' \
+	    $(if $(CI),--check crosscheck='$(TEST_ENV) tools/crosscheck/run.sh') \
 	    --last trace='$(PYTHON) tools/trace.py --results $(BUILD)/test-results --quiet'
 
 .PHONY: test-host
 test-host: ## the pure modules on this machine, with the sanitizers, and their arithmetic on the AVR
-	@$(call build_parts,$(HOST_PARTS) $(AVR_PARTS))
-	@$(RUN_TESTS) --results $(BUILD)/test-host $(call unity_runs,$(HOST_BINS)) \
-	    $(foreach run,$(AVR_TESTS),--unity '$(BUILD)/avr/run $(BUILD)/avr/$(run).elf')
+	@$(call build_then_run,$(HOST_PARTS) $(AVR_PARTS),test-host) $(call test_runs,$(HOST_BINS)) $(AVR_RUNS)
 
 .PHONY: test-board
 test-board: ## the simulated board against the datasheet
-	@$(call build_parts,$(BOARD_PARTS))
-	@$(RUN_TESTS) --results $(BUILD)/test-board $(call unity_runs,$(BOARD_BINS))
+	@$(call build_then_run,$(BOARD_PARTS),test-board) $(call test_runs,$(BOARD_BINS))
 
 .PHONY: test-image
 test-image: ## the whole image on the simulated board
-	@$(call build_parts,$(IMAGE_PARTS))
-	@$(RUN_TESTS) --results $(BUILD)/test-image $(call unity_runs,$(IMAGE_BINS))
+	@$(call build_then_run,$(IMAGE_PARTS),test-image) $(call test_runs,$(IMAGE_BINS))
+
+.PHONY: test-scripts
+test-scripts: ## the simulator program as its user sees it, and the scripts that check the build
+	@$(call build_then_run,$(SIM_PARTS),test-scripts) $(SCRIPT_RUNS)
 
 .PHONY: trace
 trace: ## which requirement which passing test shows (of the last `make test`); raises docs/trace-count
@@ -305,7 +312,7 @@ format: ## clang-format on all C files that git knows
 
 .PHONY: lint
 lint: ## the checks alone: includes, pin table, budgets; shell scripts where shellcheck is installed
-	@$(RUN_TESTS) --results $(BUILD)/lint $(CHECKS)
+	@$(call build_then_run,$(BUILD)/sac.elf,lint) $(CHECKS)
 	@if command -v shellcheck >/dev/null; then shellcheck sac tools/setup.sh .ci/run; fi
 
 .PHONY: setup
@@ -318,7 +325,7 @@ clean: ## remove what was built; what setup fetched stays in .tools/
 
 .PHONY: help
 help: ## this list
-	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | awk -F '\t' '{ printf "  %-11s %s\n", $$1, $$2 }'
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' Makefile | awk -F '\t' '{ printf "  %-12s %s\n", $$1, $$2 }'
 
 .PHONY: FORCE
 FORCE:

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Runs test binaries and checks side by side and sums them up.
 
-Each Unity binary counts with the totals it prints; each check (a command that succeeds or fails) counts as one test. A
-binary that is missing, crashes, runs out of time or runs no test counts as one failure more. What a binary or a check
-printed is kept in <results>/<name>.txt. The last line is `N passed, N failed`; the exit code is 0 if nothing failed.
+Each test program, Unity's or Python's unittest, counts with the totals it prints; each check (a command that succeeds or fails) counts as one
+test. A program that is missing, crashes, runs out of time or runs no test counts as one failure more. What a program or
+a check printed is kept in <results>/<name>.txt. The last line is `N passed, N failed`; the exit code is 0 if nothing failed.
 """
 import argparse
 import concurrent.futures
@@ -14,13 +14,14 @@ import subprocess
 import sys
 import time
 
-TOTALS = re.compile(r"^(\d+) Tests (\d+) Failures (\d+) Ignored", re.MULTILINE)
+UNITY_TOTALS = re.compile(r"^(\d+) Tests (\d+) Failures (\d+) Ignored", re.MULTILINE)
+PYTHON_TOTAL = re.compile(r"^Ran (\d+) tests? in .*\n\n(?:OK|FAILED)(?: \((.*)\))?$", re.MULTILINE)
 FAILED_LINE = re.compile(r"^.*:FAIL.*$", re.MULTILINE)
 TAIL_LINES = 25
 
 
 class Outcome:
-    """What one binary or check came to."""
+    """What one program or check came to."""
 
     def __init__(self, name, passed, failed, ignored, seconds, note, output):
         self.name, self.passed, self.failed, self.ignored = name, passed, failed, ignored
@@ -34,8 +35,18 @@ class Outcome:
         return f"{verdict:6} {self.name:34} {self.passed:4} passed, {self.failed} failed{ignored}  {self.seconds:.1f} s{note}"
 
 
-def run(name, command, unity, results, timeout_s):
-    """Runs one command and returns its Outcome."""
+def read_totals(output):
+    """Returns (tests, failures, ignored) as a test program has printed them, all of it summed."""
+    totals = [tuple(map(int, found)) for found in UNITY_TOTALS.findall(output)]
+    for ran, details in PYTHON_TOTAL.findall(output):
+        counts = dict(part.split("=") for part in details.split(", ")) if details else {}
+        failures = sum(int(counts.get(kind, 0)) for kind in ("failures", "errors", "unexpected successes"))
+        totals.append((int(ran), failures, int(counts.get("skipped", 0))))
+    return tuple(sum(column) for column in zip(*totals)) if totals else (0, 0, 0)
+
+
+def run(name, command, counts, results, timeout_s):
+    """Runs one command, a test program that counts or a check, and returns its Outcome."""
     start = time.monotonic()
     note = ""
     try:
@@ -52,15 +63,14 @@ def run(name, command, unity, results, timeout_s):
     seconds = time.monotonic() - start
     (results / f"{name}.txt").write_text(output, encoding="utf-8")
 
-    if not unity:
+    if not counts:
         good = code == 0
         skipped = re.search(r"^\w+: skipped\b.*$", output, re.MULTILINE)
         if good and skipped:
             return Outcome(name, 0, 0, 1, seconds, skipped[0], output)
         return Outcome(name, int(good), int(not good), 0, seconds, note, output)
 
-    totals = [tuple(map(int, found)) for found in TOTALS.findall(output)]
-    tests, failures, ignored = (sum(column) for column in zip(*totals)) if totals else (0, 0, 0)
+    tests, failures, ignored = read_totals(output)
     failed = failures
     if tests == 0 and not note:
         note = "ran no test"
@@ -87,8 +97,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--results", type=pathlib.Path, default=pathlib.Path("build/test-results"))
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--timeout", type=int, default=1500, help="seconds for one binary")
-    parser.add_argument("--unity", action="append", default=[], metavar="COMMAND", help="a Unity binary")
+    parser.add_argument("--timeout", type=int, default=1500, help="seconds for one program")
+    parser.add_argument("--tests", action="append", default=[], metavar="COMMAND", help="a test program")
     parser.add_argument("--check", action="append", default=[], metavar="NAME=COMMAND")
     parser.add_argument("--last", action="append", default=[], metavar="NAME=COMMAND", help="a check after all others")
     arguments = parser.parse_args()
@@ -97,19 +107,19 @@ def main():
     for old in arguments.results.glob("*.txt"):
         old.unlink()
 
-    def start(pool, text, unity):
-        if unity:
+    def start(pool, text, counts):
+        if counts:
             command = shlex.split(text)
             name = "-".join(pathlib.Path(command[-1]).with_suffix("").parts[-2:])
         else:
             name, _, line = text.partition("=")
             command = shlex.split(line)
-        return pool.submit(run, name, command, unity, arguments.results, arguments.timeout)
+        return pool.submit(run, name, command, counts, arguments.results, arguments.timeout)
 
     outcomes = []
-    for unity, checks in ((arguments.unity, arguments.check), ([], arguments.last)):
+    for programs, checks in ((arguments.tests, arguments.check), ([], arguments.last)):
         with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
-            running = [start(pool, text, True) for text in unity] + [start(pool, text, False) for text in checks]
+            running = [start(pool, text, True) for text in programs] + [start(pool, text, False) for text in checks]
             for finished in concurrent.futures.as_completed(running):
                 outcomes.append(finished.result())
                 report(outcomes[-1])

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Tests of the scripts in tools/: each must find the fault it is there for.
 
-Run from the top of the repository. AVR_PREFIX names the compiler (avr-).
+The environment's AVR is the compiler's prefix (avr-).
 """
 import os
 import pathlib
@@ -11,8 +11,7 @@ import tempfile
 import unittest
 
 TOP = pathlib.Path(__file__).resolve().parents[2]
-AVR = os.environ.get("AVR_PREFIX", "avr-")
-AVR = str(TOP / AVR) if "/" in AVR and not AVR.startswith("/") else AVR
+AVR = os.environ.get("AVR", "avr-")
 
 
 class ToolTest(unittest.TestCase):
@@ -223,10 +222,10 @@ class Runner(ToolTest):
     """tools/run_tests.py"""
 
     def run_script(self, script):
-        """Runs a shell script as a Unity binary; returns the exit code and the last line."""
+        """Runs a shell script as a test program; returns the exit code and the last line."""
         path = self.write("unit/test_x", f"#!/bin/sh\n{script}\n")
         path.chmod(0o755)
-        code, text = self.tool("run_tests.py", "--unity", "unit/test_x", "--check", "good=true", "--timeout", "1")
+        code, text = self.tool("run_tests.py", "--tests", "unit/test_x", "--check", "good=true", "--timeout", "1")
         return code, text.splitlines()[-1]
 
     def test_totals_are_summed(self):
@@ -237,6 +236,11 @@ class Runner(ToolTest):
 
     def test_failures_fail(self):
         self.assertEqual((1, "4 passed, 2 failed"), self.run_script("echo 5 Tests 2 Failures 0 Ignored; exit 2"))
+
+    def test_python_totals_are_read(self):
+        code, line = self.run_script("printf 'Ran 5 tests in 1.0s\\n\\nFAILED (failures=1, errors=1, skipped=1)\\n'; exit 1")
+        self.assertEqual((1, "3 passed, 2 failed"), (code, line))
+        self.assertEqual((0, "6 passed, 0 failed"), self.run_script("printf 'Ran 5 tests in 1.0s\\n\\nOK\\n'"))
 
     def test_crash_fails(self):
         self.assertEqual((1, "1 passed, 1 failed"), self.run_script("kill -SEGV $$"))
@@ -253,7 +257,7 @@ class Runner(ToolTest):
         self.assertEqual((1, "1 passed, 1 failed"), self.run_script("exec sleep 60"))
 
     def test_missing_binary_fails(self):
-        code, text = self.tool("run_tests.py", "--unity", "none", "--check", "bad=false")
+        code, text = self.tool("run_tests.py", "--tests", "none", "--check", "bad=false")
         self.assertEqual((1, "0 passed, 2 failed"), (code, text.splitlines()[-1]))
 
 
