@@ -21,15 +21,15 @@ void terminal_port_init(uint32_t baud)
     UCSR0B = _BV(RXCIE0) | _BV(RXEN0) | _BV(TXEN0);
 }
 
-bool terminal_port_get(uint8_t *byte)
+int16_t terminal_port_get(void)
 {
     const uint8_t tail = usart_rx_tail;
     if (tail == usart_rx_head) {
-        return false;
+        return -1;
     }
-    *byte = usart_rx_bytes[tail];
+    const uint8_t byte = usart_rx_bytes[tail];
     usart_rx_tail = (uint8_t)((tail + 1) & (USART_RX_BYTES - 1));
-    return true;
+    return byte;
 }
 
 uint8_t terminal_port_free(void)

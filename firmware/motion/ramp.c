@@ -3,19 +3,23 @@
  * point is used only to come near at the start of a ramp or when the group size changes; the remainder is exact there
  * too, so no error of it survives. */
 #include "motion/ramp.h"
+#include "base/wide.h"
 #include <math.h>
 
 /* Shortest group worth planning: the planner's cost per group plus the interrupt's, in cycles = ticks. */
 #define GROUP_MIN_TICKS 800u
 #define GROUP_MIN_TICKS_FULL 1600u /* harmonic, while every interval has to be computed from scratch */
-#define GROUP_MIN_TICKS_LINEAR 1000u
+#define GROUP_MIN_TICKS_LINEAR 1600u
 #define GROUP_MIN_TICKS_LINEAR_FULL 3500u
 #define GROUP_MAX 128u
+#define GROUP_MAX_TICKS 65536u /* so that a group's periods fit the timer and a command can be cut soon */
 
 void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev)
 {
-    constants->k512 = (96000000000ull * 512u + steps_per_rev / 2u) / steps_per_rev;
-    constants->k512_float = (float)constants->k512;
+    uint64_t k512 = (96000000000ull * 512u + steps_per_rev / 2u) / steps_per_rev;
+    constants->k512_low = (uint32_t)k512;
+    constants->v2_least = (uint32_t)(k512 >> 31) + 1;
+    constants->k512 = (float)(uint32_t)(k512 >> 16) * 65536.0f;
 }
 
 /* -- harmonic ---------------------------------------------------------------------------------------------------- */
@@ -23,9 +27,9 @@ void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev)
 /* round(k512 / mid2), with its exact remainder: |rest| <= mid2 / 2 or so. */
 static uint32_t divide_k(const ramp_constants_t *constants, uint32_t mid2, int32_t *rest)
 {
-    uint32_t q8 = (uint32_t)(constants->k512_float / (float)mid2);
+    uint32_t q8 = (uint32_t)(constants->k512 / (float)mid2);
     /* Modulo 2^32: the true remainder is small. */
-    int32_t r = (int32_t)((uint32_t)constants->k512 - q8 * mid2);
+    int32_t r = (int32_t)(constants->k512_low - q8 * mid2);
     int32_t divisor = (int32_t)mid2;
     int32_t correction = r / divisor;
     q8 += (uint32_t)correction;
@@ -41,32 +45,25 @@ static uint32_t divide_k(const ramp_constants_t *constants, uint32_t mid2, int32
     return q8;
 }
 
-/* True where divide_k() is valid: the quotient fits 31 bits. */
-static bool fits_q8(const ramp_constants_t *constants, uint32_t mid2)
-{
-    return (uint32_t)(constants->k512 >> 31) < mid2;
-}
-
 ramp_time_t ramp_interval(const ramp_constants_t *constants, uint32_t v)
 {
     ramp_time_t t;
     uint32_t mid2 = 2 * v;
-    if (fits_q8(constants, mid2)) {
+    if (mid2 >= constants->v2_least) {
         int32_t rest;
         uint32_t q8 = divide_k(constants, mid2, &rest);
         t.ticks = q8 >> 8;
         t.frac = (uint8_t)q8;
     } else {
-        uint64_t q8 = constants->k512 / mid2;
-        t.ticks = (uint32_t)(q8 >> 8);
-        t.frac = (uint8_t)q8;
+        t.ticks = (uint32_t)(constants->k512 / 256.0f / (float)mid2);
+        t.frac = 0;
     }
     return t;
 }
 
 uint32_t ramp_velocity(const ramp_constants_t *constants, uint32_t ticks)
 {
-    return (uint32_t)(constants->k512_float / 512.0f / (float)ticks + 0.5f);
+    return (uint32_t)(constants->k512 / 512.0f / (float)ticks + 0.5f);
 }
 
 void ramp_begin_harmonic(ramp_t *ramp, const ramp_constants_t *constants, uint32_t v_first, uint32_t step, bool faster,
@@ -89,13 +86,14 @@ void ramp_begin_harmonic(ramp_t *ramp, const ramp_constants_t *constants, uint32
 static uint16_t choose_group(uint16_t group, uint32_t interval_ticks, uint32_t slope_q8, uint16_t min_ticks)
 {
     uint16_t at_least = 1;
+    bool may_grow = interval_ticks * group < GROUP_MAX_TICKS / 2;
     while (interval_ticks < min_ticks && at_least < GROUP_MAX) {
         at_least = (uint16_t)(at_least * 2);
         interval_ticks *= 2;
     }
     if (group < at_least)
         return at_least;
-    if (slope_q8 <= 40 && group < GROUP_MAX) /* twice the group spreads over less than 2 * 2 * 40 / 256 tick */
+    if (slope_q8 <= 40 && group < GROUP_MAX && may_grow) /* twice the group spreads over less than 2 * 2 * 40 / 256 tick */
         return (uint16_t)(group * 2);
     if (slope_q8 > 192 && group > at_least)
         return (uint16_t)(group / 2);
@@ -146,12 +144,11 @@ static void harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, uint3
     uint32_t total;
     int32_t slope;
     if (from_scratch || group != ramp->group) {
-        if (!fits_q8(constants, mid2)) {
-            /* More than a second: only at the very start of a crawl. */
-            uint64_t wide = constants->k512 / mid2;
-            sum->ticks = (uint32_t)(wide >> 8);
-            sum->frac = (uint8_t)wide;
-            ramp->u.harmonic.q8 = 0xFFFFFFFFu;
+        if (mid2 < constants->v2_least) {
+            /* Half a second and more: only at the start or end of a crawl. */
+            ramp_time_t wide = ramp_interval(constants, mid2 / 2);
+            *sum = wide;
+            ramp->u.harmonic.q8 = UINT32_MAX;
             ramp->u.harmonic.mid2 = mid2;
             ramp->group = 0;
             return;
@@ -224,126 +221,178 @@ static void harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, uint3
 
 /* -- linear ------------------------------------------------------------------------------------------------------ */
 
-uint64_t ramp_linear_c(uint16_t steps_per_rev, uint8_t factor_log2, uint32_t accel_centi)
+void ramp_linear_c(wide_t *c_q8, uint16_t steps_per_rev, uint8_t factor_log2, uint32_t accel_centi)
 {
     /* 2 * alpha / accel in ticks^2 * 256 = 2 * (2 pi / (sprf * F)) / (centi / 100) * (16e6)^2 * 256
      *                                    = 8.23549667...e19 / (sprf * F * centi); an eighth of it fits 64 bits. */
-    uint64_t divisor = ((uint64_t)steps_per_rev * accel_centi) << factor_log2;
-    const uint64_t eighth = 10294370808072384000ull;
-    uint64_t whole = eighth / divisor;
-    uint64_t rest = eighth - whole * divisor;
-    return whole * 8u + rest * 8u / divisor;
+    wide_t divisor = (wide_t)steps_per_rev * accel_centi;
+    *c_q8 = (10294370808072384000ull / divisor << 3) >> factor_log2;
 }
 
-static float to_float(int64_t x)
+static float to_float(const wide_t *x)
 {
-    return (float)(int32_t)(x >> 32) * 4294967296.0f + (float)(uint32_t)x;
+    int32_t half[2];
+    __builtin_memcpy(half, x, sizeof half);
+    return (float)half[1] * 4294967296.0f + (float)(uint32_t)half[0];
 }
 
-uint64_t ramp_linear_time(uint64_t c_q8, uint32_t n, int64_t *rest)
+void ramp_from_float(wide_t *x, float f)
 {
-    *rest = 0;
-    if (n == 0)
-        return 0;
-    float root = sqrtf((float)n) * sqrtf(to_float((int64_t)(c_q8 >> 1)) * 2.0f);
-    uint64_t t = (uint64_t)root;
-    for (uint8_t i = 0; i < 2; i++) {
-        int64_t missing = (int64_t)(c_q8 * n - t * t); /* modulo 2^64: it is small */
-        t += (uint64_t)(int64_t)(to_float(missing) / (2.0f * root));
+    uint32_t half[2] = {0, 0};
+    if (f >= 4294967296.0f) {
+        half[1] = (uint32_t)(f * (1.0f / 4294967296.0f));
+        f -= (float)half[1] * 4294967296.0f;
     }
-    *rest = (int64_t)(c_q8 * n - t * t);
-    return t;
+    half[0] = (uint32_t)f;
+    __builtin_memcpy(x, half, sizeof half);
 }
 
-void ramp_begin_linear(ramp_t *ramp, uint64_t c_q8, uint64_t t_q4, int64_t rest, bool faster, uint32_t max_ticks)
+void ramp_linear_time(wide_t *t_q4, const wide_t *c_q8, uint32_t n, wide_t *rest)
+{
+    float root = sqrtf((float)n) * sqrtf(to_float(c_q8));
+    wide_t wide_n = n;
+    wide_t square;
+    ramp_from_float(t_q4, root);
+    for (uint8_t i = 0; i < 3; i++) {
+        wide_multiply(rest, c_q8, &wide_n);
+        wide_multiply(&square, t_q4, t_q4);
+        wide_subtract(rest, &square); /* modulo 2^64: it is small */
+        int32_t correction = (int32_t)(to_float(rest) / (2.0f * root));
+        if (correction == 0)
+            break;
+        wide_t wide_correction = (wide_t)(int64_t)correction;
+        wide_add(t_q4, &wide_correction);
+    }
+}
+
+void ramp_begin_linear(ramp_t *ramp, const wide_t *c_q8, const wide_t *t_q4, const wide_t *rest, bool faster,
+                       uint32_t max_ticks)
 {
     ramp->linear = true;
     ramp->faster = faster;
     ramp->group = 0;
     ramp->group_limit = 1;
     ramp->max_ticks = max_ticks;
-    ramp->u.linear.t_q4 = t_q4;
-    ramp->u.linear.c_q8 = c_q8;
-    ramp->u.linear.rest = faster ? rest : -rest;
+    ramp->u.linear.t_q4 = *t_q4;
+    ramp->u.linear.c_q8 = *c_q8;
+    ramp->u.linear.rest = 0;
+    if (faster)
+        wide_add(&ramp->u.linear.rest, rest);
+    else
+        wide_subtract(&ramp->u.linear.rest, rest);
     ramp->u.linear.sum_q4 = 0;
     ramp->u.linear.slope_q4 = 0;
     ramp->u.linear.curve_q4 = 0;
 }
 
-/* Duration of a group from the law, in floating point. */
-static uint32_t linear_estimate(uint64_t t_q4, uint64_t group_c, bool faster)
+/* Duration of a group whose C is `c`, from the law in floating point. */
+static uint32_t linear_estimate(float t, float c, bool faster)
 {
-    float t = to_float((int64_t)t_q4);
-    float c = to_float((int64_t)(group_c >> 1)) * 2.0f;
-    float square = faster ? t * t + c : t * t - c;
-    if (square < t * t * 1e-5f)
-        return (uint32_t)t_q4; /* the last group: to standstill exactly */
-    return (uint32_t)(c / (t + sqrtf(square)));
+    float square = t * t;
+    float after = faster ? square + c : square - c;
+    if (after < square * 1e-5f)
+        return (uint32_t)t; /* the last group: to standstill exactly */
+    return (uint32_t)(c / (t + sqrtf(after)));
+}
+
+/* Makes s exact: group_c = s * (2t + s), or s * (2t - s) when slowing, up to half a unit; what is left is the rest. */
+static uint32_t linear_exact(ramp_t *ramp, uint32_t s)
+{
+    bool faster = ramp->faster;
+    wide_t *rest = &ramp->u.linear.rest;
+    wide_t wide_s = s;
+    wide_t divisor = ramp->u.linear.t_q4; /* 2t +- s, then 2t +- 2s: what one unit of s changes */
+    wide_t product;
+    wide_add(&divisor, &divisor);
+    if (faster)
+        wide_add(&divisor, &wide_s);
+    else
+        wide_subtract(&divisor, &wide_s);
+    wide_multiply(&product, &wide_s, &divisor);
+    wide_add(rest, &ramp->u.linear.group_c);
+    wide_subtract(rest, &product);
+    if (faster)
+        wide_add(&divisor, &wide_s);
+    else
+        wide_subtract(&divisor, &wide_s);
+    for (uint8_t tries = 0; tries < 4; tries++) {
+        /* Enough of both to divide: rest is a few thousand units of s at most. */
+        uint8_t byte = wide_from_byte(&divisor, 2) < 0x1000 ? 1 : 2;
+        int32_t unit = wide_from_byte(&divisor, byte);
+        int32_t off = wide_from_byte(rest, byte);
+        int32_t half = unit >> 1;
+        if (unit < 64 || (off <= half && off >= -half))
+            break;
+        int32_t correction = off > 0 ? 1 : -1;
+        if (off > 2 * unit || off < -2 * unit)
+            correction = off / unit;
+        /* (s + c)(2t + s + c) = s(2t + s) + c(2t + 2s) + c^2 */
+        wide_t wide_correction = (wide_t)(int64_t)correction;
+        s += (uint32_t)correction;
+        if (faster)
+            wide_add(&divisor, &wide_correction);
+        else
+            wide_subtract(&divisor, &wide_correction);
+        wide_multiply(&product, &wide_correction, &divisor);
+        wide_subtract(rest, &product);
+        if (faster)
+            wide_add(&divisor, &wide_correction);
+        else
+            wide_subtract(&divisor, &wide_correction);
+    }
+    return s;
 }
 
 static void linear_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum)
 {
-    uint64_t t = ramp->u.linear.t_q4;
     bool faster = ramp->faster;
-    /* Near standstill the intervals change too fast to be carried on. */
-    bool from_scratch = ramp->group == 0 || (uint64_t)ramp->u.linear.sum_q4 << 5 > t;
-    uint32_t s;
+    uint32_t s = ramp->u.linear.sum_q4;
     int32_t slope = ramp->u.linear.slope_q4;
     int32_t curve = ramp->u.linear.curve_q4;
-    uint16_t wish = ramp->group_limit;
-
+    /* Near standstill (less than 16 groups away) the intervals change too fast to be carried on; where one lasts long
+     * there is time enough to compute it. */
+    bool from_scratch = ramp->group == 0 || s >> 20 || (int32_t)(s >> 11) >= wide_from_byte(&ramp->u.linear.t_q4, 2);
+    float t = 0.0f;
+    uint32_t interval_ticks;
+    uint32_t slope_q8 = UINT32_MAX;
     if (ramp->group == 0) {
-        /* The size of the first group follows from its interval. */
-        uint32_t first = linear_estimate(t, ramp->u.linear.c_q8, faster) >> 4;
-        wish = choose_group(wish, first, UINT16_MAX, GROUP_MIN_TICKS_LINEAR_FULL);
+        interval_ticks = linear_estimate(to_float(&ramp->u.linear.t_q4), to_float(&ramp->u.linear.c_q8), faster) >> 4;
     } else {
-        uint32_t interval_ticks = ramp->u.linear.sum_q4 >> 4;
-        uint32_t slope_q8 = magnitude(slope) << 4; /* of the mean interval, between groups */
+        interval_ticks = s >> 4;
+        slope_q8 = magnitude(slope); /* of the mean interval, between groups */
+        slope_q8 = slope_q8 < 0x10000u ? slope_q8 << 4 : UINT32_MAX;
         for (uint16_t g = ramp->group; g > 1; g >>= 1) {
             interval_ticks >>= 1;
             slope_q8 >>= 1;
         }
-        wish = choose_group(wish, interval_ticks, slope_q8,
-                            from_scratch ? GROUP_MIN_TICKS_LINEAR_FULL : GROUP_MIN_TICKS_LINEAR);
+    }
+    uint16_t wish = choose_group(ramp->group_limit, interval_ticks, slope_q8,
+                                 from_scratch ? GROUP_MIN_TICKS_LINEAR_FULL : GROUP_MIN_TICKS_LINEAR);
+    if (ramp->group != 0) {
         /* Near a standstill accuracy goes before the planner's load. */
-        while (wish > 1 && (uint64_t)(interval_ticks * wish) << 8 > t)
+        while (wish > 1 && (int32_t)(interval_ticks * wish >> 8) > wide_from_byte(&ramp->u.linear.t_q4, 2))
             wish /= 2;
     }
     ramp->group_limit = wish;
     uint16_t group = limit_group(wish, left);
 
-    if (from_scratch || group != ramp->group) {
-        ramp->u.linear.group_c = ramp->u.linear.c_q8 * group;
-        s = linear_estimate(t, ramp->u.linear.group_c, faster);
+    if (group != ramp->group) {
+        wide_t wide_group = group;
+        wide_multiply(&ramp->u.linear.group_c, &wide_group, &ramp->u.linear.c_q8);
+        ramp->group = group;
         from_scratch = true;
+    }
+    if (from_scratch) {
+        t = to_float(&ramp->u.linear.t_q4);
+        s = linear_estimate(t, to_float(&ramp->u.linear.group_c), faster);
     } else {
-        s = ramp->u.linear.sum_q4 + (uint32_t)(slope + curve);
+        s += (uint32_t)(slope + curve);
     }
-
-    /* Exact: group_c = s * (2t + s), or s * (2t - s) when slowing; rest says by how much t^2 is off n * C. */
-    int64_t rest = ramp->u.linear.rest;
-    uint64_t twice = faster ? 2 * t + s : 2 * t - s;
-    rest += (int64_t)(ramp->u.linear.group_c - (uint64_t)s * (uint32_t)twice - ((uint64_t)(s * (uint32_t)(twice >> 32)) << 32));
-    int64_t divisor = (int64_t)(faster ? twice + s : twice - s);
-    if (divisor > 0) {
-        int64_t half = divisor >> 1;
-        uint8_t tries = 4;
-        while (tries && (rest > half || rest < -half)) {
-            int32_t correction = rest > 0 ? 1 : -1;
-            if (rest > 8 * half || rest < -8 * half)
-                correction = (int32_t)(to_float(rest) / to_float(divisor));
-            /* (s + c)(2t + s + c) = s(2t + s) + c(2t + 2s) + c^2 */
-            int64_t square = (int64_t)correction * correction;
-            rest -= correction * divisor + (faster ? square : -square);
-            s += (uint32_t)correction;
-            divisor += faster ? 2 * (int64_t)correction : -2 * (int64_t)correction;
-            tries--;
-        }
-    }
+    s = linear_exact(ramp, s);
     if (from_scratch) {
         /* Derivatives of sqrt(x * C): change of the duration from group to group = duration^2 / t, and so on. */
         float f = (float)s;
-        float ratio = f / (to_float((int64_t)t) + f);
+        float ratio = f / (t + f);
         f *= ratio;
         slope = (int32_t)(faster ? -f : f);
         curve = (int32_t)(3.0f * f * ratio);
@@ -353,14 +402,13 @@ static void linear_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum)
         curve = slope - slope_before;
     }
     ramp->u.linear.curve_q4 = curve;
-    ramp->u.linear.rest = rest;
     ramp->u.linear.slope_q4 = slope;
     ramp->u.linear.sum_q4 = s;
+    wide_t wide_s = s;
     if (faster)
-        ramp->u.linear.t_q4 = t + s;
+        wide_add(&ramp->u.linear.t_q4, &wide_s);
     else
-        ramp->u.linear.t_q4 = t > s ? t - s : 0;
-    ramp->group = group;
+        wide_subtract(&ramp->u.linear.t_q4, &wide_s);
 
     sum->ticks = s >> 4;
     sum->frac = (uint8_t)(s << 4);

@@ -16,6 +16,7 @@
 
 #include <stdbool.h>
 #include <stdint.h>
+#include "base/wide.h"
 
 typedef struct {
     uint32_t ticks;
@@ -24,8 +25,9 @@ typedef struct {
 
 /* Depends on steps per revolution: 2 * 256 * K, K = 96e9 / steps_per_rev (ticks times velocity units). */
 typedef struct {
-    uint64_t k512;
-    float k512_float;
+    float k512;
+    uint32_t k512_low; /* modulo 2^32 */
+    uint32_t v2_least; /* twice the velocity below which k512 / v2 needs more than 31 bits */
 } ramp_constants_t;
 
 typedef struct {
@@ -46,10 +48,10 @@ typedef struct {
             int32_t curve;    /* change of slope, likewise */
         } harmonic;
         struct {
-            uint64_t t_q4;     /* time from standstill at the next pulse */
-            uint64_t c_q8;     /* C */
-            uint64_t group_c;  /* C times the group's pulses */
-            int64_t rest;      /* k * C - t^2, exact */
+            wide_t t_q4;       /* time from standstill at the next pulse */
+            wide_t c_q8;       /* C */
+            wide_t group_c;    /* C times the group's pulses */
+            wide_t rest;       /* faster: k * C - t^2; slower: t^2 - k * C; exact, signed, small */
             uint32_t sum_q4;   /* duration of the last group */
             int32_t slope_q4;  /* its change from the group before */
             int32_t curve_q4;  /* change of slope, likewise */
@@ -72,13 +74,17 @@ void ramp_begin_harmonic(ramp_t *ramp, const ramp_constants_t *constants, uint32
 
 /* Linear ramp with C = c_q8 / 256 ticks^2 per pulse, beginning at the time t_q4 / 16 ticks from standstill, which is
  * off by `rest` (ramp_linear_time). A slowing one never has an interval above max_ticks. */
-void ramp_begin_linear(ramp_t *ramp, uint64_t c_q8, uint64_t t_q4, int64_t rest, bool faster, uint32_t max_ticks);
+void ramp_begin_linear(ramp_t *ramp, const wide_t *c_q8, const wide_t *t_q4, const wide_t *rest, bool faster,
+                       uint32_t max_ticks);
 
 /* C for a ramp value in hundredths of rad/s^2. factor_log2: microsteps per full step. */
-uint64_t ramp_linear_c(uint16_t steps_per_rev, uint8_t factor_log2, uint32_t accel_centi);
+void ramp_linear_c(wide_t *c_q8, uint16_t steps_per_rev, uint8_t factor_log2, uint32_t accel_centi);
 
 /* t from standstill to n pulses: sqrt(n * C), to one unit of 1/16 tick; *rest = n * C - t^2, what was rounded off. */
-uint64_t ramp_linear_time(uint64_t c_q8, uint32_t n, int64_t *rest);
+void ramp_linear_time(wide_t *t_q4, const wide_t *c_q8, uint32_t n, wide_t *rest);
+
+/* f >= 0, truncated. */
+void ramp_from_float(wide_t *x, float f);
 
 /* The next group of at most `left` pulses: returns how many (>= 1) and the sum of their intervals. */
 uint16_t ramp_next(ramp_t *ramp, const ramp_constants_t *constants, uint32_t left, ramp_time_t *sum);

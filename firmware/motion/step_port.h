@@ -17,9 +17,9 @@ void step_port_dir(bool level);
 void step_port_start(void);
 #define STEP_PORT_LEAD_TICKS 64u
 
-/* Stops the timer at once, except that a pulse which has begun or is about to is completed first. Returns true if that
- * was so: it ended after the snapshot's period count. No edge comes after the return. */
-bool step_port_halt(void);
+/* Stops the timer at once, except that a pulse which has begun or is about to is completed first. No edge comes after
+ * the return; step_port_snapshot() then tells where it stopped. */
+void step_port_halt(void);
 
 /* Where the step interrupt is, read in one atomic section. */
 typedef struct {
@@ -30,18 +30,20 @@ typedef struct {
 } step_snapshot_t;
 step_snapshot_t step_port_snapshot(void);
 
-/* Turns the silent closing segment at `offset` into one that ends with a pulse and, if `set_dir`, begins with the dir
- * pin at `dir`; drops what follows it in the ring. False if it has begun already: nothing is changed then. */
-bool step_port_arm(uint8_t offset, uint16_t match, uint8_t flags);
+/* Turns the silent one-period segment at `offset`, the last but for silence, into one that ends with a pulse, and drops
+ * what follows it in the ring. False if it has begun, or is about to: nothing is changed then. */
+bool step_port_arm(uint8_t offset, uint16_t top, uint16_t match, uint8_t flags);
 
-/* Adds one period to the segment at `offset` and drops what follows it in the ring. False if its end is too near. */
+/* Adds one period to the segment at `offset` and drops what follows it. False if its end is too near. */
 bool step_port_extend(uint8_t offset);
 
-/* Ends the ring early: at the latest after the segment at `*last`, and within that one after at most `periods` more
- * periods. Returns how many periods of it were dropped. */
-uint16_t step_port_shorten(uint8_t offset, uint16_t periods);
+/* Drops what follows the segment at `offset`. False if that has been loaded already. */
+bool step_port_drop_after(uint8_t offset);
 
-/* Executes nothing that could be interrupted by the step interrupt between the two. */
+/* Lets the segment at `offset` end after at most `periods` more periods and drops what follows it. */
+void step_port_shorten(uint8_t offset, uint16_t periods);
+
+/* Holds interrupts off between the two, for a few cycles. */
 uint8_t step_port_lock(void);
 void step_port_unlock(uint8_t state);
 

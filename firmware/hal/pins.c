@@ -1,0 +1,36 @@
+/* Directions, pull-ups and idle levels of all posts, from the table in board.h. */
+#include "board.h"
+#include "pins_port.h"
+#include <avr/io.h>
+
+
+/* All inputs have their pull-up on (manual lines 217, 678). */
+void pins_init(void)
+{
+    uint8_t ddr_b = 0, ddr_c = 0, ddr_d = 0;
+    uint8_t port_b = 0, port_c = 0, port_d = 0;
+#define DDR_IN(port, bit) port_##port |= 1 << (bit)
+#define DDR_OUT(port, bit) ddr_##port |= 1 << (bit)
+#define ddr_B ddr_b
+#define ddr_C ddr_c
+#define ddr_D ddr_d
+#define port_B port_b
+#define port_C port_c
+#define port_D port_d
+#define POST(name, port, bit, nano, direction, remark) DDR_##direction(port, bit);
+    BOARD_POSTS(POST)
+#undef POST
+    port_c |= 1 << 2; /* OPSB, the inverse of OPSA */
+    port_d |= 1 << 1; /* an idle serial line is high */
+    PORTB = port_b;
+    PORTC = port_c;
+    PORTD = port_d;
+    DDRB = ddr_b;
+    DDRC = ddr_c;
+    DDRD = ddr_d;
+
+    /* 1 MHz on OC2A from Timer2 alone: CTC, toggle every 8 cycles (datasheet section 18.7.2). */
+    OCR2A = 7;
+    TCCR2A = 1 << COM2A0 | 1 << WGM21;
+    TCCR2B = 1 << CS20;
+}

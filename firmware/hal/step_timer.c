@@ -1,0 +1,246 @@
+/* Timer1 under the step engine: fast PWM mode 15 on OC1B, inverting (see motion/segment.h and docs/design.md).
+ *
+ * Every section with interrupts off is short: the step interrupt may be due every 32 cycles. Timer1's 16-bit registers
+ * share one TEMP byte, so the main loop touches them only with interrupts off or the timer stopped. */
+#include "motion/segment.h"
+#include "motion/step_port.h"
+#include <avr/interrupt.h>
+#include <avr/io.h>
+
+#define MODE15_A (1 << COM1B1 | 1 << COM1B0 | 1 << WGM11 | 1 << WGM10)
+#define MODE15_B (1 << WGM13 | 1 << WGM12)
+#define RUNNING (MODE15_B | 1 << CS10)
+#define LEAD_BEGIN 4 /* not at BOTTOM, where the buffers would be loaded */
+
+/* Ticks between reading TCNT1 and the timer standing still, and a margin. */
+#define FREEZE_TICKS 16
+
+static segment_t *segment_at(uint8_t offset)
+{
+    return (segment_t *)((uint8_t *)segments + offset);
+}
+
+void step_port_init(void)
+{
+    TCCR1A = 0;
+    TCCR1B = 0;
+    TIMSK1 = 0;
+}
+
+void step_port_dir(bool level)
+{
+    /* Single-bit instructions: no other bit of the port is touched. */
+    if (level)
+        PORTB |= 1 << 5;
+    else
+        PORTB &= (uint8_t)~(1 << 5);
+}
+
+void step_port_start(void)
+{
+    TIMSK1 = 0;
+    TCCR1B = 0;
+    /* Mode 0 with the clock off: the compare registers are written directly (section 16.7.3). */
+    TCCR1A = 0;
+    OCR1A = STEP_PORT_LEAD_TICKS + LEAD_BEGIN - 1;
+    OCR1B = SEGMENT_SILENT;
+    TCNT1 = LEAD_BEGIN;
+    TCCR1A = MODE15_A;
+    TCCR1B = MODE15_B;
+
+    uint8_t first = step_tail;
+    const segment_t *s = segment_at(first);
+    segment_t *lead = segment_at((uint8_t)(first - SEGMENT_BYTES));
+    lead->top = STEP_PORT_LEAD_TICKS - 1;
+    lead->match = SEGMENT_SILENT;
+    lead->flags = 0;
+    OCR1A = s->top;
+    OCR1B = s->match;
+    GPIOR0 = s->count_low;
+    GPIOR1 = s->count_high;
+    step_flags = s->flags;
+    motion_state = s->flags & SEGMENT_STATE_MASK;
+    step_tail = (uint8_t)(first + SEGMENT_BYTES);
+    step_idle = 0;
+    TIFR1 = 1 << TOV1;
+    TIMSK1 = 1 << TOIE1;
+    TCCR1B = RUNNING;
+}
+
+step_snapshot_t step_port_snapshot(void)
+{
+    step_snapshot_t at;
+    uint8_t sreg = SREG;
+    cli();
+    uint8_t low = GPIOR0;
+    uint8_t high = GPIOR1;
+    uint8_t flags = TIFR1;
+    uint8_t pins = PINB;
+    at.tail = step_tail;
+    SREG = sreg;
+    at.to_count = (uint16_t)((uint16_t)high << 8) + (uint16_t)(low ? low : 256u);
+    at.pulse_high = (pins & 1 << 2) != 0;
+    at.period_over = (flags & 1 << TOV1) != 0;
+    return at;
+}
+
+void step_port_halt(void)
+{
+    if (!(TIMSK1 & 1 << TOIE1)) {
+        /* Stopped, or playing uncounted silence. */
+        TCCR1B = MODE15_B;
+        TIFR1 = 1 << TOV1;
+        return;
+    }
+    for (;;) {
+        cli();
+        if (!(TIFR1 & 1 << TOV1)) {
+            uint8_t loaded_offset = (uint8_t)(step_tail - SEGMENT_BYTES);
+            const segment_t *s = segment_at(loaded_offset);
+            if (GPIOR0 == s->count_low && GPIOR1 == s->count_high)
+                s = segment_at((uint8_t)(loaded_offset - SEGMENT_BYTES)); /* its last period is running */
+            uint16_t match = s->match;
+            uint16_t now = TCNT1;
+            if (match == SEGMENT_SILENT || (uint16_t)(now + FREEZE_TICKS) < match) {
+                TCCR1B = MODE15_B; /* no clock: nothing moves from here on */
+                break;
+            }
+            if (s->top < SEGMENT_EARLY_BELOW_TICKS) {
+                /* The pulse is due or there, and over in a moment: freeze right behind it. */
+                while (!(TIFR1 & 1 << TOV1))
+                    ;
+                TCCR1B = MODE15_B;
+                break;
+            }
+        }
+        /* A pulse is due or there: let it pass. */
+        sei();
+        __asm__ __volatile__("nop\n\tnop");
+    }
+    TIMSK1 = 0;
+    sei();
+}
+
+bool step_port_arm(uint8_t offset, uint16_t top, uint16_t match, uint8_t flags)
+{
+    segment_t *s = segment_at(offset);
+    uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
+    uint16_t too_late = segment_at((uint8_t)(offset - SEGMENT_BYTES))->top;
+    too_late = too_late > 64 ? (uint16_t)(too_late - 64) : 0;
+    bool done = false;
+
+    uint8_t sreg = SREG;
+    cli();
+    uint8_t distance = (uint8_t)(after - step_tail);
+    if (distance != 0 && distance <= (uint8_t)(step_head - step_tail)) {
+        s->top = top;
+        s->match = match;
+        s->flags = flags;
+        step_head = after;
+        done = true;
+    } else if (distance == 0 && GPIOR0 == 1 && !(TIFR1 & 1 << TOV1) && TCNT1 < too_late) {
+        /* Loaded, not begun: the buffers can still be written. */
+        OCR1A = top;
+        OCR1B = match;
+        step_flags = flags;
+        step_head = after;
+        done = true;
+    }
+    SREG = sreg;
+    if (done) {
+        /* For the position; the interrupt reads a segment only once. */
+        s->top = top;
+        s->match = match;
+        s->flags = flags;
+    }
+    return done;
+}
+
+bool step_port_extend(uint8_t offset)
+{
+    segment_t *s = segment_at(offset);
+    uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
+    bool done = false;
+    uint16_t counted = (uint16_t)((uint16_t)s->count_high << 8) + (uint16_t)(s->count_low ? s->count_low : 256u) + 1u;
+    uint8_t count_high = (uint8_t)((uint16_t)(counted - 1u) >> 8);
+
+    uint8_t sreg = SREG;
+    cli();
+    uint8_t distance = (uint8_t)(after - step_tail);
+    if (distance != 0 && distance <= (uint8_t)(step_head - step_tail)) {
+        s->count_low = (uint8_t)counted;
+        s->count_high = count_high;
+        step_head = after;
+        done = true;
+    } else if (distance == 0) {
+        uint8_t low = GPIOR0;
+        if (low >= 16 && low != 255) {
+            GPIOR0 = (uint8_t)(low + 1);
+            step_head = after;
+            done = true;
+        }
+    }
+    SREG = sreg;
+    if (done) {
+        s->count_low = (uint8_t)counted;
+        s->count_high = count_high;
+    }
+    return done;
+}
+
+bool step_port_drop_after(uint8_t offset)
+{
+    uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
+    uint8_t sreg = SREG;
+    cli();
+    bool done = (uint8_t)(after - step_tail) <= (uint8_t)(step_head - step_tail);
+    if (done)
+        step_head = after;
+    SREG = sreg;
+    return done;
+}
+
+void step_port_shorten(uint8_t offset, uint16_t periods)
+{
+    segment_t *s = segment_at(offset);
+    uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
+    uint8_t new_low = (uint8_t)periods;
+    uint8_t new_high = (uint8_t)((uint16_t)(periods - 1) >> 8);
+    uint16_t dropped = 0;
+
+    uint8_t sreg = SREG;
+    cli();
+    uint8_t tail = step_tail;
+    step_head = after;
+    if (tail == after) {
+        uint8_t low = GPIOR0;
+        uint8_t high = GPIOR1;
+        if (high > new_high || (high == new_high && (uint8_t)(low - 1) > (uint8_t)(new_low - 1))) {
+            GPIOR0 = new_low;
+            GPIOR1 = new_high;
+            dropped = (uint16_t)(((uint16_t)high << 8) + (uint8_t)(low - 1));
+            dropped = (uint16_t)(dropped - (uint16_t)(((uint16_t)new_high << 8) + (uint8_t)(new_low - 1)));
+        }
+        SREG = sreg;
+        uint16_t counted = (uint16_t)((uint16_t)s->count_high << 8) + (uint16_t)(s->count_low ? s->count_low : 256u);
+        counted = (uint16_t)(counted - dropped);
+        s->count_low = (uint8_t)counted;
+        s->count_high = (uint8_t)((uint16_t)(counted - 1) >> 8);
+    } else {
+        s->count_low = new_low;
+        s->count_high = new_high;
+        SREG = sreg;
+    }
+}
+
+uint8_t step_port_lock(void)
+{
+    uint8_t sreg = SREG;
+    cli();
+    return sreg;
+}
+
+void step_port_unlock(uint8_t state)
+{
+    SREG = state;
+}

@@ -1,0 +1,923 @@
+/* See engine.h; why it is built this way: docs/design.md. */
+#include "motion/engine.h"
+#include "motion/profile.h"
+#include "motion/ramp.h"
+#include "motion/segment.h"
+#include "motion/step_port.h"
+#include "settings.h"
+
+#define TICKS_PER_US 16u
+#define DIR_SETUP_TICKS 80u      /* dir before the first pulse: 5 us, the slowest common drivers ask for it */
+#define TAIL_TICKS 320u          /* the end of the closing interval, on which a following command is joined */
+#define SHORTEST_PIECE_TICKS 128u
+#define SILENCE_MAX_PERIODS 65000u
+#define AHEAD_TICKS 16384u       /* silence begun before a profile is planned: 1 ms */
+#define CUT_KEEP_TICKS 16384u    /* motion left to run while a deceleration is planned */
+#define CRUISE_GROUP_TICKS 1600u /* shortest run of a cruise whose interval has a fraction */
+#define RING_RESERVE 4u          /* segments that one step of emission may need */
+
+/* What comes next of the command being emitted. */
+typedef enum {
+    STAGE_REST, /* nothing: all of it is in the ring or played */
+    STAGE_LEAD, /* start wait and first pulse */
+    STAGE_RUN,  /* the intervals between its pulses */
+    STAGE_TAIL, /* the end of its closing interval */
+    STAGE_GAP,  /* the interval in which the velocity stays in play */
+    STAGE_END,
+} stage_t;
+
+typedef struct {
+    motion_command_t command;
+    profile_t profile;
+} job_t;
+
+static profile_basis_t basis;
+static job_t now;  /* being emitted or played */
+static job_t next; /* taken, planned, not begun */
+static bool next_taken;
+static bool playing; /* the timer runs (it may play silence) */
+static stage_t stage;
+static ramp_t ramp;
+static motion_state_t ramp_state; /* the phase that `ramp` was begun for; MOTION_STANDBY: none */
+
+static uint32_t silence_chunks;  /* still to be emitted before ... */
+static uint16_t piece_ticks;     /* ... this period; 0: none */
+static bool piece_pulse;
+static int16_t carry_q8;         /* 1/256 ticks rounded off so far */
+static uint32_t ahead_ticks;     /* part of the next interval that has been emitted as silence */
+static bool dir_due;             /* the next single period sets the dir pin */
+static profile_interval_t closing; /* of the last command emitted */
+static uint8_t tail_offset;      /* its tail segment, while stage is REST, GAP or END */
+static bool tail_valid;
+static bool tail_fast;           /* too fast for a tail: a following command lengthens the last run instead */
+static uint8_t last_run_offset;
+
+static uint8_t retired; /* offset of the first segment not yet added to position */
+static int32_t position;
+static uint8_t ended;
+static uint8_t faults;
+static bool gap_on = true;
+static uint32_t v_in_play;
+static uint32_t in_play_cycle_us; /* 0: follows from v_in_play */
+static uint16_t pulses_due;       /* single pulses waiting: bits below the highest one set, 1 = CCW, oldest on top */
+
+static uint16_t pulse_width_ticks(void)
+{
+    return (uint16_t)settings.pulse_us * TICKS_PER_US;
+}
+
+static bool dir_level(bool ccw)
+{
+    return ccw != (settings.cw_level != 0);
+}
+
+static bool is_ccw(const job_t *job)
+{
+    return (job->command.flags & MOTION_CCW) != 0;
+}
+
+void engine_init(void)
+{
+    profile_basis(&basis, settings.steps_per_rev, settings.ustep, settings.slow_rpm);
+    v_in_play = basis.v_slow;
+    pulses_due = 1;
+    step_port_init();
+}
+
+/* -- the ring -------------------------------------------------------------------------------------------------- */
+
+static segment_t *segment_at(uint8_t offset)
+{
+    return &segments[offset / SEGMENT_BYTES];
+}
+
+static uint8_t early_periods(uint8_t flags)
+{
+    return (uint8_t)(((flags >> SEGMENT_EARLY_BIT) & 1) + ((flags >> SEGMENT_EARLIER_BIT) & 1));
+}
+
+/* Periods that the interrupt counts: those waited for early are not among them. */
+static uint16_t counted_periods(const segment_t *s)
+{
+    return (uint16_t)((uint16_t)(s->count_high << 8) + (s->count_low ? s->count_low : 256u));
+}
+
+static uint32_t period_ticks(const segment_t *s)
+{
+    return s->top + (uint32_t)1;
+}
+
+static bool is_silent(const segment_t *s)
+{
+    return s->match == SEGMENT_SILENT;
+}
+
+static uint8_t ring_free(void)
+{
+    /* One slot stays empty; the loaded segment and the one before it are still needed for the position. */
+    uint8_t used = (uint8_t)(step_head - step_tail) / SEGMENT_BYTES;
+    return (uint8_t)(SEGMENT_COUNT - 3u - used);
+}
+
+/* Pulses of the running command that are not in the ring yet, its closing interval apart. */
+static uint8_t pulses_to_come(void)
+{
+    const profile_t *p = &now.profile;
+    uint32_t left = p->accel_pulses + p->cruise_pulses + p->decel_pulses;
+    return left > 255 ? 254 : left > 1 ? (uint8_t)(left - 1) : 0;
+}
+
+/* Appends `periods` periods of `ticks`. Runs too short to be reloaded in time (less than 96 ticks a period and hardly
+ * more periods than are waited for) are stretched: their count stays exact. */
+static void push(uint16_t periods, uint16_t top, bool pulse, motion_state_t state)
+{
+    segment_t *s = segment_at(step_head);
+    uint8_t flags = (uint8_t)state;
+    if (top < SEGMENT_EARLY_BELOW_TICKS - 1) {
+        uint8_t early = 1 << SEGMENT_EARLY_BIT;
+        if (top < SEGMENT_EARLIER_BELOW_TICKS - 1)
+            early |= 1 << SEGMENT_EARLIER_BIT;
+        if (periods > early_periods(early)) {
+            flags |= early;
+            periods = (uint16_t)(periods - early_periods(early));
+        } else {
+            top = SEGMENT_EARLY_BELOW_TICKS - 1;
+        }
+    }
+    if (is_ccw(&now))
+        flags |= 1 << SEGMENT_CCW_BIT;
+    if (dir_due && periods == 1) {
+        flags |= 1 << SEGMENT_SET_DIR_BIT;
+        if (dir_level(is_ccw(&now)))
+            flags |= 1 << SEGMENT_DIR_BIT;
+        dir_due = false;
+    }
+    s->top = top;
+    s->match = pulse ? (uint16_t)(top - pulse_width_ticks()) : SEGMENT_SILENT;
+    s->count_low = (uint8_t)periods;
+    s->count_high = (uint8_t)((uint16_t)(periods - 1) >> 8);
+    s->flags = flags;
+    step_hold = pulse ? pulses_to_come() : 0;
+    step_head = (uint8_t)(step_head + SEGMENT_BYTES);
+}
+
+static void add_pulses(uint8_t flags, uint16_t pulses)
+{
+    if (flags & (1 << SEGMENT_CCW_BIT))
+        position -= pulses;
+    else
+        position += pulses;
+}
+
+/* Adds what the interrupt has left behind to the position: all segments before the loaded one. */
+static void retire_to(uint8_t offset)
+{
+    while (retired != offset) {
+        const segment_t *s = segment_at(retired);
+        if (!is_silent(s)) {
+            add_pulses(s->flags, counted_periods(s));
+            add_pulses(s->flags, early_periods(s->flags));
+        }
+        if ((s->flags & SEGMENT_STATE_MASK) == MOTION_STOP)
+            ended++;
+        retired = (uint8_t)(retired + SEGMENT_BYTES);
+    }
+}
+
+static void skip_pulses(uint8_t pulses);
+
+static bool retire(void)
+{
+    if (!playing)
+        return false;
+    uint8_t loaded = (uint8_t)(step_tail - SEGMENT_BYTES);
+    bool some = retired != loaded;
+    retire_to(loaded);
+    if (step_late) {
+        step_late = 0;
+        faults |= ENGINE_FAULT_LATE;
+    }
+    if (step_held) {
+        uint8_t lock = step_port_lock();
+        uint8_t held = step_held;
+        step_held = 0;
+        step_port_unlock(lock);
+        faults |= ENGINE_FAULT_STARVED;
+        add_pulses(step_flags, held);
+        skip_pulses(held);
+    }
+    return some;
+}
+
+/* Pulses made after the last retired segment, clockwise positive. */
+static int16_t pulses_since_retired(void)
+{
+    step_snapshot_t at = step_port_snapshot();
+    uint8_t loaded_offset = (uint8_t)(at.tail - SEGMENT_BYTES);
+    retire_to(loaded_offset);
+    const segment_t *loaded = segment_at(loaded_offset);
+    const segment_t *before = segment_at((uint8_t)(loaded_offset - SEGMENT_BYTES));
+    uint16_t begun = (uint16_t)(counted_periods(loaded) - at.to_count);
+    const segment_t *running = begun ? loaded : before;
+    int16_t pulses = begun ? (int16_t)(begun - 1) : -1;
+    if (at.period_over || at.pulse_high)
+        pulses++;
+    if (is_silent(running))
+        return 0;
+    return running->flags & (1 << SEGMENT_CCW_BIT) ? (int16_t)-pulses : pulses;
+}
+
+int32_t engine_position(void)
+{
+    return playing ? position + pulses_since_retired() : position;
+}
+
+/* -- emission -------------------------------------------------------------------------------------------------- */
+
+/* Sets up an interval that ends with a pulse (or not); emit() turns it into segments. */
+static void set_interval(uint32_t chunks, uint32_t ticks, bool pulse)
+{
+    if (ahead_ticks) {
+        while (ticks < ahead_ticks + SHORTEST_PIECE_TICKS) {
+            ticks += PROFILE_CHUNK_TICKS;
+            chunks--;
+        }
+        ticks -= ahead_ticks;
+        ahead_ticks = 0;
+    }
+    if (chunks && ticks < SHORTEST_PIECE_TICKS) {
+        ticks += PROFILE_CHUNK_TICKS;
+        chunks--;
+    }
+    if (chunks == 1 && ticks < PROFILE_CHUNK_TICKS) {
+        ticks += PROFILE_CHUNK_TICKS;
+        chunks = 0;
+    }
+    silence_chunks = chunks;
+    piece_ticks = (uint16_t)ticks; /* below 65536 */
+    piece_pulse = pulse;
+}
+
+/* Adds the carried fraction to a time; what remains is carried on. */
+static uint32_t take_carry(uint32_t ticks, uint16_t frac_q8)
+{
+    int16_t carry = (int16_t)(carry_q8 + (int16_t)frac_q8);
+    carry_q8 = carry & 0xFF;
+    return (uint32_t)((int32_t)ticks + (carry >> 8));
+}
+
+static uint8_t shortest_run(uint16_t ticks)
+{
+    return ticks >= SEGMENT_EARLY_BELOW_TICKS ? 1 : ticks >= SEGMENT_EARLIER_BELOW_TICKS ? 2 : 3;
+}
+
+/* `pulses` intervals, `longer` of them of ticks + 1, the others of ticks. */
+static void push_run(uint16_t pulses, uint16_t longer, uint16_t ticks, bool faster, motion_state_t state)
+{
+    uint8_t shortest = shortest_run(ticks);
+    if (longer < shortest && longer != 0) {
+        carry_q8 = (int16_t)(carry_q8 + (int16_t)(longer << 8));
+        longer = 0;
+    } else if (pulses - longer < shortest && longer != pulses) {
+        carry_q8 = (int16_t)(carry_q8 - (int16_t)((pulses - longer) << 8));
+        longer = pulses;
+    }
+    uint16_t shorter = (uint16_t)(pulses - longer);
+    if (faster && longer)
+        push(longer, ticks, true, state);
+    if (shorter)
+        push(shorter, (uint16_t)(ticks - 1), true, state);
+    if (!faster && longer)
+        push(longer, ticks, true, state);
+}
+
+/* The next intervals of a ramp. */
+static void emit_ramp(uint32_t *left, uint32_t at_most, motion_state_t state, bool faster)
+{
+    if (ramp_state != state) {
+        ramp_state = state;
+        if (state == MOTION_ACCEL)
+            profile_begin_accel(&now.profile, &basis, &ramp);
+        else
+            profile_begin_decel(&now.profile, &basis, &ramp);
+    }
+    ramp_time_t sum;
+    uint16_t pulses = ramp_next(&ramp, &basis.ramp, at_most, &sum);
+    *left -= pulses;
+    uint32_t ticks = take_carry(sum.ticks, sum.frac);
+    if (pulses == 1) {
+        if (ticks > 65535u || ahead_ticks)
+            set_interval(ticks >> PROFILE_CHUNK_LOG2, ticks & (PROFILE_CHUNK_TICKS - 1), true);
+        else
+            push(1, (uint16_t)(ticks - 1), true, state);
+        return;
+    }
+    uint16_t each;
+    uint16_t longer;
+    if ((pulses & (pulses - 1)) == 0) {
+        uint32_t quotient = ticks;
+        for (uint16_t g = pulses; g > 1; g >>= 1)
+            quotient >>= 1;
+        each = (uint16_t)quotient;
+        longer = (uint16_t)((uint16_t)ticks & (pulses - 1));
+    } else {
+        each = (uint16_t)(ticks / pulses);
+        longer = (uint16_t)(ticks - (uint32_t)each * pulses);
+    }
+    push_run(pulses, longer, each, faster, state);
+}
+
+static void emit_cruise(uint32_t *left, uint32_t at_most)
+{
+    const profile_interval_t *interval = &now.profile.cruise;
+    uint32_t ticks = interval->ticks_q8 >> 8;
+    uint8_t frac = (uint8_t)interval->ticks_q8;
+    uint32_t chunks = interval->chunks;
+    if (chunks == 1 && ticks < PROFILE_CHUNK_TICKS - 1) {
+        ticks += PROFILE_CHUNK_TICKS;
+        chunks = 0;
+    }
+    if (chunks || ahead_ticks) {
+        (*left)--;
+        ticks = take_carry(ticks, frac);
+        set_interval(chunks, ticks, true);
+        return;
+    }
+    uint16_t run = at_most > 65000u ? 65000u : (uint16_t)at_most;
+    if (frac == 0) {
+        push(run, (uint16_t)(ticks - 1), true, MOTION_CRUISE);
+    } else {
+        uint16_t block = 8;
+        while (block < 1024 && block * ticks < CRUISE_GROUP_TICKS)
+            block = (uint16_t)(block * 2);
+        if (run > block)
+            run = block;
+        uint32_t fraction = (uint32_t)run * frac + (uint16_t)carry_q8;
+        carry_q8 = (int16_t)(fraction & 0xFF);
+        push_run(run, (uint16_t)(fraction >> 8), (uint16_t)ticks, true, MOTION_CRUISE);
+    }
+    *left -= run;
+}
+
+/* The interval after the last pulse of the command: body, then tail. */
+static void begin_closing(void)
+{
+    profile_t *p = &now.profile;
+    uint32_t chunks = 0;
+    uint32_t ticks;
+    motion_state_t state = p->decel_pulses ? MOTION_DECEL : p->cruise_pulses ? MOTION_CRUISE : MOTION_ACCEL;
+    if (state == MOTION_CRUISE) {
+        chunks = p->cruise.chunks;
+        ticks = take_carry(p->cruise.ticks_q8 >> 8, (uint8_t)p->cruise.ticks_q8);
+    } else {
+        if (ramp_state != state) {
+            ramp_state = state;
+            if (state == MOTION_ACCEL)
+                profile_begin_accel(p, &basis, &ramp);
+            else
+                profile_begin_decel(p, &basis, &ramp);
+        }
+        ramp_time_t sum;
+        (void)ramp_next(&ramp, &basis.ramp, 1, &sum);
+        ticks = take_carry(sum.ticks, sum.frac);
+        chunks = ticks >> PROFILE_CHUNK_LOG2;
+        ticks &= PROFILE_CHUNK_TICKS - 1;
+    }
+    p->accel_pulses = p->cruise_pulses = p->decel_pulses = 0;
+    ramp_state = state; /* the body belongs to the phase */
+    closing.chunks = chunks;
+    closing.ticks_q8 = ticks << 8;
+    tail_fast = chunks == 0 && ticks < SEGMENT_EARLY_BELOW_TICKS;
+    stage = STAGE_TAIL;
+    if (chunks || ticks >= 2 * TAIL_TICKS) {
+        if (ticks < 2 * TAIL_TICKS) {
+            ticks += PROFILE_CHUNK_TICKS;
+            chunks--;
+        }
+        set_interval(chunks, ticks - TAIL_TICKS, false);
+    }
+}
+
+static void push_tail(void)
+{
+    uint16_t ticks = TAIL_TICKS;
+    if (closing.chunks == 0 && closing.ticks_q8 >> 8 < 2 * TAIL_TICKS) {
+        ticks = (uint16_t)(closing.ticks_q8 >> 8);
+        if (ahead_ticks)
+            ahead_ticks = 0;
+    }
+    if (tail_fast)
+        ticks = SHORTEST_PIECE_TICKS;
+    tail_offset = step_head;
+    last_run_offset = (uint8_t)(step_head - SEGMENT_BYTES);
+    tail_valid = true;
+    push(1, (uint16_t)(ticks - 1), false, MOTION_STOP);
+}
+
+static bool join_next(void);
+
+/* One step of emission; false if there is nothing to emit. The ring has room for RING_RESERVE segments. */
+static bool emit(void)
+{
+    if (silence_chunks) {
+        uint16_t periods = silence_chunks > SILENCE_MAX_PERIODS ? SILENCE_MAX_PERIODS : (uint16_t)silence_chunks;
+        silence_chunks -= periods;
+        push(periods, PROFILE_CHUNK_TICKS - 1, false, ramp_state);
+        return true;
+    }
+    if (piece_ticks) {
+        uint16_t ticks = piece_ticks;
+        piece_ticks = 0;
+        push(1, (uint16_t)(ticks - 1), piece_pulse, ramp_state);
+        return true;
+    }
+    profile_t *p = &now.profile;
+    switch (stage) {
+    case STAGE_REST:
+        return false;
+    case STAGE_LEAD: {
+        /* The start wait, then the first pulse. */
+        uint32_t us = now.command.start_wait_us;
+        uint32_t chunks = us >> (PROFILE_CHUNK_LOG2 - 4);
+        uint32_t ticks = (us & (PROFILE_CHUNK_TICKS / TICKS_PER_US - 1)) * TICKS_PER_US;
+        if (chunks == 0 && ticks < DIR_SETUP_TICKS + pulse_width_ticks())
+            ticks = DIR_SETUP_TICKS + pulse_width_ticks();
+        ramp_state = MOTION_STANDBY;
+        set_interval(chunks, ticks, true);
+        stage = STAGE_RUN;
+        return true;
+    }
+    case STAGE_RUN: {
+        uint32_t after_accel = p->cruise_pulses + p->decel_pulses;
+        if (p->accel_pulses + after_accel <= 1) {
+            begin_closing();
+        } else if (p->accel_pulses) {
+            emit_ramp(&p->accel_pulses, p->accel_pulses - (after_accel == 0), MOTION_ACCEL, p->faster);
+        } else if (p->cruise_pulses) {
+            ramp_state = MOTION_CRUISE;
+            emit_cruise(&p->cruise_pulses, p->cruise_pulses - (p->decel_pulses == 0));
+        } else {
+            emit_ramp(&p->decel_pulses, p->decel_pulses - 1, MOTION_DECEL, false);
+        }
+        return true;
+    }
+    case STAGE_TAIL:
+        push_tail();
+        v_in_play = p->v_exit;
+        in_play_cycle_us = p->exit_cycle_us;
+        stage = STAGE_GAP;
+        if (next_taken)
+            return join_next();
+        return true;
+    case STAGE_GAP:
+        ramp_state = MOTION_STANDBY;
+        if (gap_on)
+            set_interval(closing.chunks, tail_fast ? SHORTEST_PIECE_TICKS : closing.ticks_q8 >> 8, false);
+        stage = STAGE_END;
+        return true;
+    case STAGE_END:
+        push(1, SHORTEST_PIECE_TICKS - 1, false, MOTION_STANDBY);
+        stage = STAGE_REST;
+        return true;
+    }
+    return false;
+}
+
+static void skip_pulses(uint8_t pulses)
+{
+    /* Held pulses were made at an interval that had been planned for other pulses: these are left out. */
+    profile_t *p = &now.profile;
+    while (pulses) {
+        uint32_t *left = p->accel_pulses ? &p->accel_pulses : p->cruise_pulses ? &p->cruise_pulses : &p->decel_pulses;
+        if (*left == 0)
+            return;
+        uint32_t most = *left < pulses ? *left : pulses;
+        if (left != &p->cruise_pulses && ramp_state == (left == &p->accel_pulses ? MOTION_ACCEL : MOTION_DECEL)) {
+            ramp_time_t sum;
+            most = ramp_next(&ramp, &basis.ramp, most, &sum);
+        }
+        *left -= most;
+        pulses = (uint8_t)(pulses - most);
+    }
+}
+
+/* -- starting and joining ----------------------------------------------------------------------------------------- */
+
+static void begin_ring(void)
+{
+    if (playing)
+        step_port_halt();
+    step_head = step_tail = 0;
+    retired = 0;
+    step_hold = 0;
+    carry_q8 = 0;
+    ahead_ticks = 0;
+    silence_chunks = 0;
+    piece_ticks = 0;
+    dir_due = false;
+    tail_valid = false;
+    ramp_state = MOTION_STANDBY;
+}
+
+static void play(void)
+{
+    playing = true;
+    step_port_start();
+}
+
+/* Starts `now`, which is not planned yet, from standstill. */
+static void start_now(void)
+{
+    begin_ring();
+    step_port_dir(dir_level(is_ccw(&now)));
+    stage = STAGE_LEAD;
+    bool plan_later = v_in_play == basis.v_slow && now.command.accel != ACCEL_NONE &&
+                      basis.slow_ticks >= AHEAD_TICKS + SHORTEST_PIECE_TICKS && basis.factor_log2 <= 4 &&
+                      now.command.start_wait_us == 0 &&
+                      profile_rpm(&basis, &now.command) * 100u << basis.factor_log2 > basis.v_slow;
+    if (plan_later) {
+        /* The first interval is long, whatever the profile: the pulse need not wait for the planning. */
+        now.profile.accel_pulses = 0;
+        now.profile.cruise_pulses = 0;
+        now.profile.decel_pulses = 0;
+        emit();
+        emit();
+        ramp_state = MOTION_ACCEL;
+        push(1, AHEAD_TICKS - 1, false, MOTION_ACCEL);
+        segment_at(0)->flags |= MOTION_ACCEL;
+        ahead_ticks = AHEAD_TICKS;
+        play();
+        profile_plan(&now.profile, &basis, &now.command, v_in_play);
+        ramp_state = MOTION_STANDBY;
+        return;
+    }
+    profile_plan(&now.profile, &basis, &now.command, v_in_play);
+    uint8_t steps = 8;
+    while (steps-- && ring_free() >= RING_RESERVE)
+        emit();
+    play();
+}
+
+/* Is the velocity in play kept until now? */
+static void expire_gap(void)
+{
+    if (gap_on) {
+        v_in_play = basis.v_slow;
+        in_play_cycle_us = 0;
+    }
+}
+
+static void plan_next(uint32_t v)
+{
+    profile_plan(&next.profile, &basis, &next.command, v);
+}
+
+/* Ticks of the start wait, saturated. */
+static uint32_t wait_ticks(uint32_t us)
+{
+    return us < UINT32_MAX / TICKS_PER_US ? us * TICKS_PER_US : UINT32_MAX;
+}
+
+/* Lets the command in `next` follow the one that has been emitted. */
+static bool join_next(void)
+{
+    uint32_t wait = wait_ticks(next.command.start_wait_us);
+    bool turns = is_ccw(&next) != is_ccw(&now);
+    uint8_t flags = MOTION_STOP;
+    if (is_ccw(&next))
+        flags |= 1 << SEGMENT_CCW_BIT;
+    if (turns) {
+        flags |= 1 << SEGMENT_SET_DIR_BIT;
+        if (dir_level(is_ccw(&next)))
+            flags |= 1 << SEGMENT_DIR_BIT;
+    }
+    bool joined = false;
+    bool waited = false;
+    if (tail_valid && wait < SHORTEST_PIECE_TICKS) {
+        if (tail_fast && !turns && wait == 0) {
+            joined = step_port_extend(last_run_offset);
+            if (joined)
+                ended++; /* no tail is played */
+        } else {
+            uint16_t top = (uint16_t)(segment_at(tail_offset)->top + wait);
+            joined = step_port_arm(tail_offset, top, (uint16_t)(top - pulse_width_ticks()), flags);
+        }
+    } else if (tail_valid) {
+        /* The wait counts from the end of the command before; longer than the gap it means a start from slow speed. */
+        uint32_t gap_ticks = closing.chunks < 0x10000u
+                                 ? (closing.chunks << PROFILE_CHUNK_LOG2) + (closing.ticks_q8 >> 8)
+                                 : UINT32_MAX;
+        if (gap_on && wait > gap_ticks && v_in_play != basis.v_slow) {
+            expire_gap();
+            plan_next(v_in_play);
+        }
+        joined = waited = step_port_drop_after(tail_offset);
+    }
+    silence_chunks = 0;
+    piece_ticks = 0;
+    next_taken = false;
+    tail_valid = false;
+    now = next;
+    ramp_state = MOTION_STANDBY;
+    if (!joined) {
+        /* Too late to be joined: it starts by itself, at the velocity in play if the gap has not passed. */
+        if (step_idle)
+            expire_gap();
+        start_now();
+        return true;
+    }
+    dir_due = waited && turns;
+    stage = waited ? STAGE_LEAD : STAGE_RUN;
+    return true;
+}
+
+status_t engine_check(const motion_command_t *command)
+{
+    return profile_check(&basis, command, settings.pulse_us);
+}
+
+bool engine_can_accept(void)
+{
+    return !next_taken;
+}
+
+void engine_submit(const motion_command_t *command)
+{
+    if (!playing) {
+        now.command = *command;
+        start_now();
+        return;
+    }
+    next.command = *command;
+    next_taken = true;
+    if (stage == STAGE_REST || stage == STAGE_END || stage == STAGE_GAP) {
+        plan_next(v_in_play);
+        join_next();
+    } else {
+        plan_next(now.profile.v_exit);
+    }
+}
+
+bool engine_poll(void)
+{
+    bool worked = retire();
+    if (playing && step_idle) {
+        if (stage == STAGE_REST) {
+            step_port_halt();
+            retire_to(step_tail);
+            playing = false;
+            tail_valid = false;
+            expire_gap();
+        } else if (step_head != step_tail) {
+            /* The planner was so late that the timer ran out of segments: go on where it stopped. */
+            faults |= ENGINE_FAULT_STARVED;
+            retire_to(step_tail);
+            step_port_start();
+        }
+        worked = true;
+    }
+    if (playing && ring_free() >= RING_RESERVE && emit())
+        worked = true;
+    if (!playing && pulses_due > 1) {
+        /* Single pulses, one at a time: a ring of one pulse. */
+        uint8_t top_bit = 15;
+        while (!(pulses_due >> top_bit))
+            top_bit--;
+        bool ccw = (pulses_due >> (top_bit - 1)) & 1;
+        pulses_due &= (uint16_t)((1u << (top_bit - 1)) - 1);
+        pulses_due |= (uint16_t)(1u << (top_bit - 1));
+        begin_ring();
+        now.command.flags = ccw ? MOTION_CCW : 0;
+        step_port_dir(dir_level(ccw));
+        now.profile.accel_pulses = now.profile.cruise_pulses = now.profile.decel_pulses = 0;
+        push(1, (uint16_t)(DIR_SETUP_TICKS + pulse_width_ticks() - 1), true, MOTION_STANDBY);
+        push(1, SHORTEST_PIECE_TICKS - 1, false, MOTION_STANDBY);
+        stage = STAGE_REST;
+        play();
+        worked = true;
+    }
+    return worked;
+}
+
+uint8_t engine_commands_ended(void)
+{
+    return ended;
+}
+
+/* -- stopping ---------------------------------------------------------------------------------------------------- */
+
+static void drop_next(void)
+{
+    if (next_taken)
+        ended++;
+    next_taken = false;
+}
+
+/* Freezes the pulse train where it is. */
+static void halt(void)
+{
+    pulses_due = 1;
+    if (!playing)
+        return;
+    step_port_halt();
+    retire();
+    position += pulses_since_retired();
+    retired = step_tail;
+    bool tail_played = stage == STAGE_REST && motion_state == MOTION_STANDBY;
+    if (!tail_played)
+        ended++;
+    playing = false;
+    tail_valid = false;
+    silence_chunks = 0;
+    piece_ticks = 0;
+    stage = STAGE_REST;
+    motion_state = MOTION_STANDBY;
+}
+
+void engine_stop(void)
+{
+    drop_next();
+    halt();
+    v_in_play = basis.v_slow;
+    in_play_cycle_us = 0;
+}
+
+/* Ends the running command after what is to be played soon. Returns the velocity there; 0: nothing to be cut (it ends
+ * by itself now, or it was frozen in the middle of a slow interval or a wait). */
+static uint32_t cut(void)
+{
+    if (!playing || (stage == STAGE_REST && motion_state == MOTION_STANDBY))
+        return 0;
+    step_snapshot_t at = step_port_snapshot();
+    uint8_t offset = (uint8_t)(at.tail - SEGMENT_BYTES);
+    uint16_t left = at.to_count;
+    uint32_t kept_ticks = 0;
+    uint32_t interval_ticks = 0; /* silent part of the interval */
+    for (;;) {
+        if (offset == step_head) {
+            /* All of it is soon over, or the ring is only a little ahead: go on from its end. */
+            if (stage != STAGE_RUN && stage != STAGE_LEAD)
+                return 0;
+            offset = (uint8_t)(offset - SEGMENT_BYTES);
+            left = counted_periods(segment_at(offset));
+            break;
+        }
+        const segment_t *s = segment_at(offset);
+        if ((s->flags & SEGMENT_STATE_MASK) == MOTION_STOP)
+            return 0;
+        uint16_t period = (uint16_t)(s->top + 1u);
+        if (!is_silent(s)) {
+            uint16_t needed = 1;
+            if (kept_ticks < CUT_KEEP_TICKS)
+                needed = (uint16_t)((CUT_KEEP_TICKS - kept_ticks) / (period ? period : 65535u) + 4u);
+            if (needed <= left) {
+                left = needed;
+                interval_ticks += period_ticks(s);
+                break;
+            }
+            interval_ticks = 0;
+        } else {
+            interval_ticks += period_ticks(s) * left;
+        }
+        kept_ticks += period_ticks(s) * left;
+        offset = (uint8_t)(offset + SEGMENT_BYTES);
+        if (offset != step_head)
+            left = counted_periods(segment_at(offset));
+    }
+    const segment_t *last = segment_at(offset);
+    if (is_silent(last) || now.profile.v_exit == 0)
+        return 0;
+    if (interval_ticks > basis.slow_ticks + 1)
+        return 0;
+    motion_state_t state = (motion_state_t)(last->flags & SEGMENT_STATE_MASK);
+    step_port_shorten(offset, left);
+    silence_chunks = 0;
+    piece_ticks = 0;
+    ahead_ticks = 0;
+    tail_valid = false;
+    closing.chunks = 0;
+    closing.ticks_q8 = period_ticks(last) << 8;
+    if (interval_ticks == 0)
+        interval_ticks = period_ticks(last);
+    (void)state;
+    return ramp_velocity(&basis.ramp, interval_ticks);
+}
+
+/* Ends the running command with a deceleration, or none. */
+static void end_command(accel_code_t decel, bool linear)
+{
+    if (!playing || (stage == STAGE_REST && motion_state == MOTION_STANDBY))
+        return;
+    motion_state_t state = engine_state();
+    if (state == MOTION_STOP || (state == MOTION_DECEL && decel != ACCEL_NONE))
+        return; /* ending already */
+    uint32_t v = cut();
+    if (v == 0) {
+        if (stage == STAGE_RUN || stage == STAGE_LEAD || silence_chunks || piece_ticks) {
+            /* At slow speed or in a wait: there is nothing to ramp down from. */
+            halt();
+            v_in_play = basis.v_slow;
+            in_play_cycle_us = 0;
+        }
+        return;
+    }
+    ramp_time_t interval = ramp_interval(&basis.ramp, v);
+    profile_plan_decel(&now.profile, &basis, v, decel, linear);
+    now.profile.cruise.chunks = interval.ticks >> PROFILE_CHUNK_LOG2;
+    now.profile.cruise.ticks_q8 = (interval.ticks & (PROFILE_CHUNK_TICKS - 1)) << 8;
+    if (now.profile.decel_pulses == 0)
+        now.profile.cruise_pulses = 1; /* the closing interval */
+    ramp_state = MOTION_STANDBY;
+    stage = STAGE_RUN;
+    if (next_taken)
+        plan_next(now.profile.v_exit);
+}
+
+void engine_stop_graceful(accel_code_t decel, bool linear)
+{
+    drop_next();
+    pulses_due = 1;
+    end_command(decel, linear);
+}
+
+void engine_next(void)
+{
+    end_command(ACCEL_NONE, false);
+}
+
+void engine_next_graceful(void)
+{
+    end_command(now.command.decel, (now.command.flags & MOTION_LINEAR) != 0);
+}
+
+void engine_single_pulse(bool ccw)
+{
+    bool standing = !playing || (stage == STAGE_REST && motion_state == MOTION_STANDBY);
+    if (!standing || next_taken || pulses_due >> 14)
+        return;
+    pulses_due = (uint16_t)(pulses_due << 1 | ccw);
+}
+
+/* -- what others see ------------------------------------------------------------------------------------------------ */
+
+motion_state_t engine_state(void)
+{
+    return (motion_state_t)motion_state;
+}
+
+void engine_velocity(uint32_t *rpm, uint32_t *cycle_us)
+{
+    uint32_t v = v_in_play;
+    uint32_t exact_cycle_us = in_play_cycle_us;
+    motion_state_t state = engine_state();
+    if (playing && state == MOTION_CRUISE) {
+        exact_cycle_us = now.profile.cycle_us;
+        v = profile_rpm(&basis, &now.command) * 100u << basis.factor_log2;
+    } else if (playing && (state == MOTION_ACCEL || state == MOTION_DECEL)) {
+        /* The interval being played: its silent part, if any, is the segment before its last period. */
+        uint8_t offset = (uint8_t)(step_port_snapshot().tail - SEGMENT_BYTES);
+        uint32_t ticks = 0;
+        for (uint8_t i = 0; i < 2; i++) {
+            const segment_t *s = segment_at(offset);
+            ticks += period_ticks(s) * (is_silent(s) ? counted_periods(s) : 1u);
+            if (!is_silent(s))
+                break;
+            offset = (uint8_t)(offset + SEGMENT_BYTES);
+            if (offset == step_head)
+                break;
+        }
+        v = ramp_velocity(&basis.ramp, ticks);
+        exact_cycle_us = 0;
+    }
+    *rpm = (v >> basis.factor_log2) / 100u;
+    *cycle_us = exact_cycle_us;
+    if (exact_cycle_us == 0) {
+        ramp_time_t interval = ramp_interval(&basis.ramp, v);
+        *cycle_us = (interval.ticks << basis.factor_log2) / TICKS_PER_US;
+    }
+}
+
+void engine_set_gap(bool on)
+{
+    gap_on = on;
+}
+
+bool engine_gap(void)
+{
+    return gap_on;
+}
+
+uint8_t engine_faults(void)
+{
+    return faults;
+}
+
+uint32_t command_rpm(const motion_command_t *command)
+{
+    return profile_rpm(&basis, command);
+}
+
+uint32_t command_cycle_us(const motion_command_t *command)
+{
+    return profile_cycle_us(&basis, command);
+}
