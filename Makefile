@@ -105,11 +105,11 @@ FIRMWARE_OBJS := $(FIRMWARE_SRCS:firmware/%=$(BUILD)/firmware/%.o)
 .PHONY: firmware
 firmware: $(BUILD)/sac.hex budgets ## build/sac.elf and build/sac.hex; budgets of flash, RAM and stack
 
-# Rewritten only when it changes; every object depends on it.
+# Rewritten only when it changes; every object depends on it. Several makes may look at it at the same time.
 $(BUILD)/firmware/flags: FORCE
 	@mkdir -p $(@D)
-	@echo '$(AVR) $(AVR_CFLAGS) $(AVR_LDFLAGS) $(DEFS) $(FIRMWARE_SRCS)' >$@.new
-	@cmp -s $@.new $@ || cp $@.new $@
+	@echo '$(AVR) $(AVR_CFLAGS) $(AVR_LDFLAGS) $(DEFS) $(FIRMWARE_SRCS)' >$@.$$$$ && \
+	    if cmp -s $@.$$$$ $@; then rm $@.$$$$; else mv $@.$$$$ $@; fi
 
 $(BUILD)/firmware/%.o: firmware/% $(BUILD)/firmware/flags
 	@mkdir -p $(@D)
