@@ -8,13 +8,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define REG_SMCR    0x53
-#define SMCR_SE     0x01
+#define REG_SMCR 0x53
+#define SMCR_SE 0x01
 #define OPCODE_RETI 0x9518
 
 /* -- life ------------------------------------------------------------------------------------------------------------ */
 
-void cpu_reset(board_t *b) {
+void cpu_reset(board_t *b)
+{
     avr_t *avr = b->avr;
 
     memset(avr->data, 0, BOARD_RAM_START); /* working registers are undefined on the chip; 0 is repeatable */
@@ -34,7 +35,8 @@ void cpu_reset(board_t *b) {
 #undef MODEL_RESET
 }
 
-board_t *board_new(const char *elf_path, const uint8_t *eeprom) {
+board_t *board_new(const char *elf_path, const uint8_t *eeprom)
+{
     board_t *b = calloc(1, sizeof *b);
     if (b == NULL)
         return NULL;
@@ -62,7 +64,8 @@ board_t *board_new(const char *elf_path, const uint8_t *eeprom) {
     return b;
 }
 
-void board_free(board_t *b) {
+void board_free(board_t *b)
+{
     if (b == NULL)
         return;
 #define MODEL_FREE(name) name##_free(b);
@@ -74,13 +77,15 @@ void board_free(board_t *b) {
     free(b);
 }
 
-uint64_t board_cycle(const board_t *b) {
+uint64_t board_cycle(const board_t *b)
+{
     return board_time(b);
 }
 
 /* -- crashes ---------------------------------------------------------------------------------------------------- */
 
-void board_crashed(board_t *b, const char *format, ...) {
+void board_crashed(board_t *b, const char *format, ...)
+{
     va_list arguments;
     if (b->crash[0] == '\0') {
         va_start(arguments, format);
@@ -90,19 +95,22 @@ void board_crashed(board_t *b, const char *format, ...) {
     b->avr->state = cpu_Crashed;
 }
 
-const char *board_crash(const board_t *b) {
+const char *board_crash(const board_t *b)
+{
     return b->crash[0] ? b->crash : NULL;
 }
 
 /* -- the processor loop -------------------------------------------------------------------------------------------- */
 
-static uint16_t opcode_at(const avr_t *avr, uint32_t pc) {
+static uint16_t opcode_at(const avr_t *avr, uint32_t pc)
+{
     return (uint16_t)(avr->flash[pc] | avr->flash[pc + 1] << 8);
 }
 
 /* The stack pointer left the range seen so far. While OUT SPH and OUT SPL move it in two steps it may point anywhere:
  * only the second counts (avr-gcc writes SPH first). */
-static void stack_moved(board_t *b, uint16_t sp, uint32_t pc) {
+static void stack_moved(board_t *b, uint16_t sp, uint32_t pc)
+{
     bool half_written = (opcode_at(b->avr, pc) & 0xFE0F) == 0xBE0E; /* OUT SPH, Rr */
     if (half_written)
         return;
@@ -116,7 +124,8 @@ static void stack_moved(board_t *b, uint16_t sp, uint32_t pc) {
 }
 
 /* After SLEEP. Every sleep mode is treated as IDLE: its clocks run on. */
-static void fall_asleep(board_t *b) {
+static void fall_asleep(board_t *b)
+{
     if (REG(b, REG_SMCR) & SMCR_SE)
         b->sleep_since = b->avr->cycle;
     else
@@ -124,7 +133,8 @@ static void fall_asleep(board_t *b) {
 }
 
 /* One instruction, one interrupt entry, or the sleep up to the next event. */
-static inline void step(board_t *b, uint64_t limit) {
+static inline void step(board_t *b, uint64_t limit)
+{
     avr_t *avr = b->avr;
     uint32_t pc;
     uint16_t sp;
@@ -164,14 +174,16 @@ static inline void step(board_t *b, uint64_t limit) {
         fall_asleep(b);
 }
 
-static bool crashed(board_t *b) {
+static bool crashed(board_t *b)
+{
     if (__builtin_expect(b->avr->state == cpu_Running || b->avr->state == cpu_Sleeping, 1))
         return false;
     board_crashed(b, "simavr stopped at 0x%04x", (unsigned)b->avr->pc);
     return true;
 }
 
-board_run_t board_run_to(board_t *b, uint64_t cycle) {
+board_run_t board_run_to(board_t *b, uint64_t cycle)
+{
     while (b->avr->cycle < cycle) {
         if (crashed(b))
             return BOARD_CRASHED;
@@ -181,11 +193,13 @@ board_run_t board_run_to(board_t *b, uint64_t cycle) {
     return crashed(b) ? BOARD_CRASHED : BOARD_RAN;
 }
 
-board_run_t board_run_for(board_t *b, uint64_t cycles) {
+board_run_t board_run_for(board_t *b, uint64_t cycles)
+{
     return board_run_to(b, b->avr->cycle + cycles);
 }
 
-board_run_t board_run_to_pc(board_t *b, uint16_t byte_address, uint64_t limit_cycles) {
+board_run_t board_run_to_pc(board_t *b, uint16_t byte_address, uint64_t limit_cycles)
+{
     uint64_t limit = b->avr->cycle + limit_cycles;
     while (b->avr->cycle < limit) {
         if (crashed(b))
@@ -197,7 +211,8 @@ board_run_t board_run_to_pc(board_t *b, uint16_t byte_address, uint64_t limit_cy
     return crashed(b) ? BOARD_CRASHED : BOARD_RAN;
 }
 
-board_run_t board_run_until(board_t *b, bool (*cond)(board_t *, void *), void *ctx, uint64_t limit_cycles) {
+board_run_t board_run_until(board_t *b, bool (*cond)(board_t *, void *), void *ctx, uint64_t limit_cycles)
+{
     uint64_t limit = b->avr->cycle + limit_cycles;
     for (;;) {
         if (crashed(b))
@@ -213,29 +228,35 @@ board_run_t board_run_until(board_t *b, bool (*cond)(board_t *, void *), void *c
 
 /* -- memory ---------------------------------------------------------------------------------------------------------- */
 
-uint8_t board_peek8(const board_t *b, uint16_t address) {
+uint8_t board_peek8(const board_t *b, uint16_t address)
+{
     return address <= BOARD_RAMEND ? b->avr->data[address] : 0xFF;
 }
 
-uint16_t board_peek16(const board_t *b, uint16_t address) {
+uint16_t board_peek16(const board_t *b, uint16_t address)
+{
     return (uint16_t)(board_peek8(b, address) | board_peek8(b, (uint16_t)(address + 1)) << 8);
 }
 
-uint32_t board_peek32(const board_t *b, uint16_t address) {
+uint32_t board_peek32(const board_t *b, uint16_t address)
+{
     return board_peek16(b, address) | (uint32_t)board_peek16(b, (uint16_t)(address + 2)) << 16;
 }
 
-void board_poke8(board_t *b, uint16_t address, uint8_t value) {
+void board_poke8(board_t *b, uint16_t address, uint8_t value)
+{
     if (address <= BOARD_RAMEND)
         b->avr->data[address] = value;
 }
 
-void board_poke16(board_t *b, uint16_t address, uint16_t value) {
+void board_poke16(board_t *b, uint16_t address, uint16_t value)
+{
     board_poke8(b, address, (uint8_t)value);
     board_poke8(b, (uint16_t)(address + 1), (uint8_t)(value >> 8));
 }
 
-void board_poke32(board_t *b, uint16_t address, uint32_t value) {
+void board_poke32(board_t *b, uint16_t address, uint32_t value)
+{
     board_poke16(b, address, (uint16_t)value);
     board_poke16(b, (uint16_t)(address + 2), (uint16_t)(value >> 16));
 }

@@ -21,8 +21,8 @@
 #include <simavr/sim_avr.h>
 
 #define BOARD_FLASH_BYTES 0x8000u
-#define BOARD_RAM_START   0x0100u
-#define BOARD_RAMEND      0x08FFu
+#define BOARD_RAM_START 0x0100u
+#define BOARD_RAMEND 0x08FFu
 
 #define NEVER UINT64_MAX
 
@@ -232,13 +232,15 @@ struct board {
 };
 
 /* simavr adds the instruction's own cycles when the hook has returned. */
-static inline void cpu_halt(board_t *b, unsigned cycles) {
+static inline void cpu_halt(board_t *b, unsigned cycles)
+{
     b->avr->cycle += cycles;
 }
 
 /* Between models of the core. */
 void events_run_until(board_t *b, uint64_t cycle);
-static inline void events_run(board_t *b, uint64_t cycle) {
+static inline void events_run(board_t *b, uint64_t cycle)
+{
     if (b->next_event <= cycle)
         events_run_until(b, cycle);
 }

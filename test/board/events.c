@@ -1,7 +1,8 @@
 /* The event queue: one slot a cause, few enough to be searched in a line. */
 #include "board_internal.h"
 
-static void find_next(board_t *b) {
+static void find_next(board_t *b)
+{
     uint64_t least = NEVER;
     for (int slot = 0; slot < EVENT_SLOTS; slot++)
         if (b->event_cycle[slot] < least)
@@ -9,7 +10,8 @@ static void find_next(board_t *b) {
     b->next_event = least;
 }
 
-void event_at(board_t *b, event_slot_t slot, uint64_t cycle, event_fn fn) {
+void event_at(board_t *b, event_slot_t slot, uint64_t cycle, event_fn fn)
+{
     uint64_t before = b->event_cycle[slot];
     b->event_cycle[slot] = cycle;
     b->event_fn[slot] = fn;
@@ -19,17 +21,20 @@ void event_at(board_t *b, event_slot_t slot, uint64_t cycle, event_fn fn) {
         find_next(b);
 }
 
-void event_cancel(board_t *b, event_slot_t slot) {
+void event_cancel(board_t *b, event_slot_t slot)
+{
     if (b->event_cycle[slot] == NEVER)
         return;
     event_at(b, slot, NEVER, NULL);
 }
 
-uint64_t event_due(const board_t *b, event_slot_t slot) {
+uint64_t event_due(const board_t *b, event_slot_t slot)
+{
     return b->event_cycle[slot];
 }
 
-void events_run_until(board_t *b, uint64_t cycle) {
+void events_run_until(board_t *b, uint64_t cycle)
+{
     bool nested = b->in_event;
     uint64_t outer = b->now;
 
@@ -48,6 +53,7 @@ void events_run_until(board_t *b, uint64_t cycle) {
     b->now = outer;
 }
 
-uint64_t board_time(const board_t *b) {
+uint64_t board_time(const board_t *b)
+{
     return b->in_event ? b->now : b->avr->cycle;
 }

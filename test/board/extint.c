@@ -3,20 +3,20 @@
 
 #include <stdlib.h>
 
-#define REG_PCIFR  0x3B
-#define REG_EIFR   0x3C
-#define REG_EIMSK  0x3D
-#define REG_PCICR  0x68
-#define REG_EICRA  0x69
+#define REG_PCIFR 0x3B
+#define REG_EIFR 0x3C
+#define REG_EIMSK 0x3D
+#define REG_PCICR 0x68
+#define REG_EICRA 0x69
 #define REG_PCMSK0 0x6B
 
 /* From a change of the pad to the flag. 13.1, figure 13-1: pin_sync, pcint_syn, pcint_setflag and PCIF follow each other
  * at clock edges. INT0 and INT1 are sampled (13.2.1) and have no further stages. */
 #define PCINT_DELAY_CYCLES 4
-#define INT_DELAY_CYCLES   2
+#define INT_DELAY_CYCLES 2
 
-#define PORT_D      2
-#define INT0_BIT    2 /* PD2, PD3 */
+#define PORT_D 2
+#define INT0_BIT 2 /* PD2, PD3 */
 #define PENDING_MAX 16
 
 enum { SENSE_LOW_LEVEL, SENSE_ANY_EDGE, SENSE_FALLING, SENSE_RISING };
@@ -35,7 +35,8 @@ struct extint {
     uint8_t port_d; /* behind the synchroniser */
 };
 
-static void update_lines(board_t *b, uint64_t cycle) {
+static void update_lines(board_t *b, uint64_t cycle)
+{
     uint8_t pcint = REG(b, REG_PCIFR) & REG(b, REG_PCICR);
     for (int group = 0; group < 3; group++)
         irq_set(b, VECTOR_PCINT0 + group, pcint >> group & 1, cycle);
@@ -47,7 +48,8 @@ static void update_lines(board_t *b, uint64_t cycle) {
     }
 }
 
-static void apply(board_t *b, const pending_t *p) {
+static void apply(board_t *b, const pending_t *p)
+{
     struct extint *e = b->extint;
 
     REG(b, REG_PCIFR) |= p->pcifr;
@@ -66,7 +68,8 @@ static void apply(board_t *b, const pending_t *p) {
 
 static void plan(board_t *b);
 
-static void pending_due(board_t *b, uint64_t cycle) {
+static void pending_due(board_t *b, uint64_t cycle)
+{
     struct extint *e = b->extint;
     for (int i = 0; i < e->count;) {
         if (e->pending[i].due > cycle) {
@@ -81,7 +84,8 @@ static void pending_due(board_t *b, uint64_t cycle) {
     plan(b);
 }
 
-static void plan(board_t *b) {
+static void plan(board_t *b)
+{
     uint64_t due = NEVER;
     for (int i = 0; i < b->extint->count; i++)
         if (b->extint->pending[i].due < due)
@@ -89,7 +93,8 @@ static void plan(board_t *b) {
     event_at(b, EVENT_EXTINT, due, pending_due);
 }
 
-static void add(board_t *b, pending_t p) {
+static void add(board_t *b, pending_t p)
+{
     struct extint *e = b->extint;
     if (e->count == PENDING_MAX)
         pending_due(b, e->pending[0].due); /* cannot be: each stage holds one change a cycle */
@@ -97,7 +102,8 @@ static void add(board_t *b, pending_t p) {
     plan(b);
 }
 
-void extint_pins_changed(board_t *b, int port, uint8_t levels, uint8_t changed, uint64_t cycle) {
+void extint_pins_changed(board_t *b, int port, uint8_t levels, uint8_t changed, uint64_t cycle)
+{
     const uint8_t ints = (uint8_t)(3u << INT0_BIT);
 
     if (port == PORT_D && (changed & ints))
@@ -106,30 +112,35 @@ void extint_pins_changed(board_t *b, int port, uint8_t levels, uint8_t changed, 
         add(b, (pending_t){cycle + PCINT_DELAY_CYCLES, 0, (uint8_t)(1u << port), 0});
 }
 
-uint8_t extint_watched(const board_t *b, int port) {
+uint8_t extint_watched(const board_t *b, int port)
+{
     uint8_t ints = port == PORT_D ? (uint8_t)(3u << INT0_BIT) : 0;
     return REG(b, REG_PCMSK0 + port) | ints;
 }
 
 /* -- registers ------------------------------------------------------------------------------------------------------ */
 
-static void write_flags(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_flags(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     REG(b, address) &= (uint8_t)~reg_written_ones(b, value);
     update_lines(b, cycle);
 }
 
-static void write_control(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_control(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     REG(b, address) = value;
     update_lines(b, cycle);
 }
 
-static void write_pcmsk(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_pcmsk(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     timers_sync(b, cycle);
     REG(b, address) = value;
     timers_replan(b);
 }
 
-static void ack(board_t *b, int vector, uint64_t cycle) {
+static void ack(board_t *b, int vector, uint64_t cycle)
+{
     if (vector >= VECTOR_PCINT0)
         REG(b, REG_PCIFR) &= (uint8_t) ~(1u << (vector - VECTOR_PCINT0));
     else
@@ -139,7 +150,8 @@ static void ack(board_t *b, int vector, uint64_t cycle) {
 
 /* -- life ------------------------------------------------------------------------------------------------------------ */
 
-void extint_init(board_t *b) {
+void extint_init(board_t *b)
+{
     b->extint = calloc(1, sizeof *b->extint);
     if (b->extint == NULL)
         abort();
@@ -154,7 +166,8 @@ void extint_init(board_t *b) {
         irq_on_ack(b, vector, ack);
 }
 
-void extint_reset(board_t *b) {
+void extint_reset(board_t *b)
+{
     struct extint *e = b->extint;
     e->count = 0;
     event_cancel(b, EVENT_EXTINT);
@@ -164,6 +177,7 @@ void extint_reset(board_t *b) {
             e->port_d |= (uint8_t)(1u << (INT0_BIT + n));
 }
 
-void extint_free(board_t *b) {
+void extint_free(board_t *b)
+{
     free(b->extint);
 }

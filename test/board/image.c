@@ -10,14 +10,15 @@
 #include <unistd.h>
 
 /* avr-gcc's address spaces inside an ELF file. */
-#define ELF_RAM        0x800000u
-#define ELF_EEPROM     0x810000u
+#define ELF_RAM 0x800000u
+#define ELF_EEPROM 0x810000u
 #define ELF_EEPROM_END 0x820000u
 
 /* Where a section is loaded: sections carry run addresses, so .data's place in flash comes from its segment. Only
  * sections with contents are looked at: a NOBITS section in front of .data (the segment ring) makes some linkers put
  * both into one segment, whose load address is then not .data's. */
-static bool load_address(Elf *elf, const GElf_Shdr *section, uint32_t *address) {
+static bool load_address(Elf *elf, const GElf_Shdr *section, uint32_t *address)
+{
     size_t segments = 0;
     if (elf_getphdrnum(elf, &segments) != 0)
         return false;
@@ -34,14 +35,16 @@ static bool load_address(Elf *elf, const GElf_Shdr *section, uint32_t *address) 
     return false;
 }
 
-static bool copy_to(uint8_t *memory, size_t size, uint32_t address, const Elf_Data *data) {
+static bool copy_to(uint8_t *memory, size_t size, uint32_t address, const Elf_Data *data)
+{
     if (data == NULL || address + data->d_size > size)
         return false;
     memcpy(memory + address, data->d_buf, data->d_size);
     return true;
 }
 
-static bool load_section(board_t *b, Elf *elf, Elf_Scn *scn, const GElf_Shdr *section) {
+static bool load_section(board_t *b, Elf *elf, Elf_Scn *scn, const GElf_Shdr *section)
+{
     uint32_t address;
     if (section->sh_addr > ELF_RAM && section->sh_addr < ELF_EEPROM) {
         uint32_t end = (uint32_t)(section->sh_addr + section->sh_size - ELF_RAM);
@@ -70,7 +73,8 @@ static bool load_section(board_t *b, Elf *elf, Elf_Scn *scn, const GElf_Shdr *se
     return true;
 }
 
-static bool load_symbols(board_t *b, Elf *elf, Elf_Scn *scn, const GElf_Shdr *section) {
+static bool load_symbols(board_t *b, Elf *elf, Elf_Scn *scn, const GElf_Shdr *section)
+{
     Elf_Data *data = elf_getdata(scn, NULL);
     size_t count = section->sh_entsize ? section->sh_size / section->sh_entsize : 0;
     b->symbols = calloc(count ? count : 1, sizeof *b->symbols);
@@ -92,7 +96,8 @@ static bool load_symbols(board_t *b, Elf *elf, Elf_Scn *scn, const GElf_Shdr *se
     return true;
 }
 
-static bool load_sections(board_t *b, Elf *elf) {
+static bool load_sections(board_t *b, Elf *elf)
+{
     Elf_Scn *scn = NULL;
     b->stack_limit = BOARD_RAM_START;
     while ((scn = elf_nextscn(elf, scn)) != NULL) {
@@ -107,7 +112,8 @@ static bool load_sections(board_t *b, Elf *elf) {
     return b->code_end > 0;
 }
 
-bool image_load(board_t *b, const char *elf_path) {
+bool image_load(board_t *b, const char *elf_path)
+{
     bool ok = false;
     int fd = open(elf_path, O_RDONLY);
     Elf *elf;
@@ -128,14 +134,16 @@ bool image_load(board_t *b, const char *elf_path) {
     return ok;
 }
 
-void image_free(board_t *b) {
+void image_free(board_t *b)
+{
     for (size_t i = 0; i < b->symbol_count; i++)
         free(b->symbols[i].name);
     free(b->symbols);
     free(b->image_eeprom);
 }
 
-bool board_symbol(const board_t *b, const char *name, uint16_t *address) {
+bool board_symbol(const board_t *b, const char *name, uint16_t *address)
+{
     const board_symbol_t *found = NULL;
     for (size_t i = 0; i < b->symbol_count; i++)
         if (strcmp(b->symbols[i].name, name) == 0 && (found == NULL || b->symbols[i].global))

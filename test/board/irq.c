@@ -4,9 +4,10 @@
 /* 7.7.1: four cycles from the end of the running instruction to the first instruction at the vector; four more when
  * the processor slept. */
 #define ENTRY_CYCLES 4
-#define WAKE_CYCLES  4
+#define WAKE_CYCLES 4
 
-void irq_set(board_t *b, int vector, bool requested, uint64_t cycle) {
+void irq_set(board_t *b, int vector, bool requested, uint64_t cycle)
+{
     uint32_t bit = 1u << vector;
     if (requested == ((b->irq_requests & bit) != 0))
         return;
@@ -14,11 +15,13 @@ void irq_set(board_t *b, int vector, bool requested, uint64_t cycle) {
     b->irq_since[vector] = cycle;
 }
 
-void irq_on_ack(board_t *b, int vector, irq_ack_t ack) {
+void irq_on_ack(board_t *b, int vector, irq_ack_t ack)
+{
     b->irq_ack[vector] = ack;
 }
 
-static void push(avr_t *avr, uint8_t value) {
+static void push(avr_t *avr, uint8_t value)
+{
     uint16_t sp = (uint16_t)(avr->data[R_SPL] | avr->data[R_SPH] << 8);
     if (sp <= avr->ramend)
         avr->data[sp] = value;
@@ -27,7 +30,8 @@ static void push(avr_t *avr, uint8_t value) {
     avr->data[R_SPH] = (uint8_t)(sp >> 8);
 }
 
-bool irq_dispatch(board_t *b) {
+bool irq_dispatch(board_t *b)
+{
     avr_t *avr = b->avr;
     uint64_t start;
     int vector;
@@ -39,8 +43,8 @@ bool irq_dispatch(board_t *b) {
         b->measures.sleep_cycles += avr->cycle - b->sleep_since;
         avr->state = cpu_Running;
         avr->cycle += WAKE_CYCLES;
-        events_run(b, avr->cycle); /* a more urgent one may have come meanwhile */
-        if (avr->state != cpu_Running)
+        events_run(b, avr->cycle); /* meanwhile a more urgent one may have come, the level gone, or a reset */
+        if (b->irq_requests == 0 || !avr->sreg[S_I] || avr->state != cpu_Running)
             return true;
     }
     vector = __builtin_ctz(b->irq_requests);

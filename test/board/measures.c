@@ -3,13 +3,15 @@
 
 #include <string.h>
 
-void measures_reset(board_t *b) {
+void measures_reset(board_t *b)
+{
     b->isr_depth = 0;
     b->masked_since = NEVER;
     b->i_seen = false;
 }
 
-void measures_enter(board_t *b, int vector, uint64_t start) {
+void measures_enter(board_t *b, int vector, uint64_t start)
+{
     board_isr_t *isr = &b->measures.isr[vector];
     uint32_t latency = (uint32_t)(start - b->irq_since[vector]);
 
@@ -25,7 +27,8 @@ void measures_enter(board_t *b, int vector, uint64_t start) {
     }
 }
 
-void measures_reti(board_t *b) {
+void measures_reti(board_t *b)
+{
     const isr_frame_t *frame;
     board_isr_t *isr;
     uint64_t whole;
@@ -45,7 +48,8 @@ void measures_reti(board_t *b) {
 }
 
 /* Called before measures_reti(), so that RETI still belongs to its interrupt. */
-void measures_i_changed(board_t *b, uint32_t pc) {
+void measures_i_changed(board_t *b, uint32_t pc)
+{
     uint32_t masked;
 
     b->i_seen = b->avr->sreg[S_I];
@@ -69,7 +73,8 @@ void measures_i_changed(board_t *b, uint32_t pc) {
     }
 }
 
-const board_measures_t *board_measures(const board_t *b) {
+const board_measures_t *board_measures(const board_t *b)
+{
     board_t *mine = (board_t *)b; /* the sums are brought up to date when they are asked for */
     mine->measures.cycles = b->avr->cycle - b->measures_since;
     if (b->avr->state == cpu_Sleeping) {
@@ -79,7 +84,8 @@ const board_measures_t *board_measures(const board_t *b) {
     return &b->measures;
 }
 
-void board_measures_clear(board_t *b) {
+void board_measures_clear(board_t *b)
+{
     uint16_t sp = board_peek16(b, R_SPL);
     memset(&b->measures, 0, sizeof b->measures);
     b->measures.stack_low = sp;

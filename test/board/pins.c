@@ -4,16 +4,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define PORTS      3
-#define PINS       (PORTS * 8)
-#define WIRES_MAX  16
+#define PORTS 3
+#define PINS (PORTS * 8)
+#define WIRES_MAX 16
 #define CLOCKS_MAX 4
 
-#define REG_PIN(port)  (uint16_t)(0x23 + 3 * (port))
-#define REG_DDR(port)  (uint16_t)(0x24 + 3 * (port))
+#define REG_PIN(port) (uint16_t)(0x23 + 3 * (port))
+#define REG_DDR(port) (uint16_t)(0x24 + 3 * (port))
 #define REG_PORT(port) (uint16_t)(0x25 + 3 * (port))
-#define REG_MCUCR      0x55
-#define MCUCR_PUD      0x10
+#define REG_MCUCR 0x55
+#define MCUCR_PUD 0x10
 
 typedef struct {
     uint8_t driven, driven_level; /* from outside */
@@ -57,11 +57,13 @@ struct pins {
     void *on_edge_ctx;
 };
 
-static uint8_t pin_bit(board_pin_t pin) {
+static uint8_t pin_bit(board_pin_t pin)
+{
     return (uint8_t)(1u << (pin & 7));
 }
 
-static void *grown(void *array, size_t *size, size_t element) {
+static void *grown(void *array, size_t *size, size_t element)
+{
     *size = *size ? *size * 2 : 256;
     array = realloc(array, *size * element);
     if (array == NULL)
@@ -71,7 +73,8 @@ static void *grown(void *array, size_t *size, size_t element) {
 
 /* -- levels ---------------------------------------------------------------------------------------------------------- */
 
-static uint8_t levels(const board_t *b, int port) {
+static uint8_t levels(const board_t *b, int port)
+{
     const port_t *p = &b->pins->port[port];
     uint8_t port_bits = REG(b, REG_PORT(port));
     uint8_t out = (uint8_t)((REG(b, REG_DDR(port)) | p->force_out) & ~p->force_in);
@@ -81,7 +84,8 @@ static uint8_t levels(const board_t *b, int port) {
     return (uint8_t)((out & out_level) | (~out & in_level));
 }
 
-static void report_edge(struct pins *pins, board_edge_t edge) {
+static void report_edge(struct pins *pins, board_edge_t edge)
+{
     if (pins->on_edge != NULL) {
         pins->on_edge(pins->on_edge_ctx, edge);
         return;
@@ -91,7 +95,8 @@ static void report_edge(struct pins *pins, board_edge_t edge) {
     pins->edge[pins->edge_count++] = edge;
 }
 
-static void edge_seen(board_t *b, board_pin_t pin, int level, uint64_t cycle) {
+static void edge_seen(board_t *b, board_pin_t pin, int level, uint64_t cycle)
+{
     struct pins *pins = b->pins;
     port_t *p = &pins->port[pin >> 3];
     uint8_t bit = pin_bit(pin);
@@ -106,7 +111,8 @@ static void edge_seen(board_t *b, board_pin_t pin, int level, uint64_t cycle) {
         pins->listener[pin](b, level, cycle);
 }
 
-static void update(board_t *b, int port, uint64_t cycle) {
+static void update(board_t *b, int port, uint64_t cycle)
+{
     port_t *p = &b->pins->port[port];
     uint8_t now = levels(b, port);
     uint8_t changed = now ^ p->level;
@@ -131,25 +137,29 @@ static void update(board_t *b, int port, uint64_t cycle) {
 
 /* 14.2.4: the synchroniser delays by half a cycle to one and a half: what changed at the very edge that starts the
  * reading cycle is not yet seen (so OUT, NOP, IN). */
-static uint8_t read_pins(board_t *b, uint16_t address, uint64_t cycle) {
+static uint8_t read_pins(board_t *b, uint16_t address, uint64_t cycle)
+{
     const port_t *p = &b->pins->port[(address - REG_PIN(0)) / 3];
     timers_sync(b, cycle);
     return p->changed_at >= cycle ? p->level_before : p->level;
 }
 
 /* 14.2.2: ones toggle PORT bits. */
-static void write_pins(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_pins(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     int port = (address - REG_PIN(0)) / 3;
     REG(b, REG_PORT(port)) ^= reg_written_ones(b, value);
     update(b, port, cycle);
 }
 
-static void write_port_or_ddr(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_port_or_ddr(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     REG(b, address) = value;
     update(b, (address - REG_PIN(0)) / 3, cycle);
 }
 
-static void write_mcucr(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_mcucr(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     REG(b, address) = value;
     for (int port = 0; port < PORTS; port++)
         update(b, port, cycle);
@@ -157,7 +167,8 @@ static void write_mcucr(board_t *b, uint16_t address, uint8_t value, uint64_t cy
 
 /* -- for the models -------------------------------------------------------------------------------------------------- */
 
-void pin_override(board_t *b, board_pin_t pin, pin_override_t how, int level, uint64_t cycle) {
+void pin_override(board_t *b, board_pin_t pin, pin_override_t how, int level, uint64_t cycle)
+{
     port_t *p = &b->pins->port[pin >> 3];
     uint8_t bit = pin_bit(pin);
 
@@ -166,27 +177,25 @@ void pin_override(board_t *b, board_pin_t pin, pin_override_t how, int level, ui
     p->force_out &= (uint8_t)~bit;
     p->force_in &= (uint8_t)~bit;
     switch (how) {
-    case PIN_FREE:
-        break;
-    case PIN_OUTPUT:
-        p->force_out |= bit; /* fall through */
+    case PIN_FREE: break;
+    case PIN_OUTPUT: p->force_out |= bit; /* fall through */
     case PIN_VALUE:
         p->value |= bit;
         if (level)
             p->value_level |= bit;
         break;
-    case PIN_INPUT:
-        p->force_in |= bit;
-        break;
+    case PIN_INPUT: p->force_in |= bit; break;
     }
     update(b, pin >> 3, cycle);
 }
 
-int pin_level(const board_t *b, board_pin_t pin) {
+int pin_level(const board_t *b, board_pin_t pin)
+{
     return b->pins->port[pin >> 3].level >> (pin & 7) & 1;
 }
 
-void pin_drive(board_t *b, board_pin_t pin, int level, uint64_t cycle) {
+void pin_drive(board_t *b, board_pin_t pin, int level, uint64_t cycle)
+{
     port_t *p = &b->pins->port[pin >> 3];
     uint8_t bit = pin_bit(pin);
 
@@ -199,29 +208,34 @@ void pin_drive(board_t *b, board_pin_t pin, int level, uint64_t cycle) {
     update(b, pin >> 3, cycle);
 }
 
-bool pin_watched(const board_t *b, board_pin_t pin) {
+bool pin_watched(const board_t *b, board_pin_t pin)
+{
     const port_t *p = &b->pins->port[pin >> 3];
     return ((p->recorded | p->wired | p->listened | extint_watched(b, pin >> 3)) & pin_bit(pin)) != 0;
 }
 
-void pin_listen(board_t *b, board_pin_t pin, pin_listener_t fn) {
+void pin_listen(board_t *b, board_pin_t pin, pin_listener_t fn)
+{
     b->pins->listener[pin] = fn;
     b->pins->port[pin >> 3].listened |= pin_bit(pin);
 }
 
 /* -- drives planned ahead: a binary heap ------------------------------------------------------------------------------ */
 
-static bool earlier(const drive_t *a, const drive_t *b) {
+static bool earlier(const drive_t *a, const drive_t *b)
+{
     return a->cycle != b->cycle ? a->cycle < b->cycle : a->order < b->order;
 }
 
-static void swap(drive_t *a, drive_t *b) {
+static void swap(drive_t *a, drive_t *b)
+{
     drive_t held = *a;
     *a = *b;
     *b = held;
 }
 
-static drive_t take_earliest(struct pins *pins) {
+static drive_t take_earliest(struct pins *pins)
+{
     drive_t first = pins->drive[0];
     size_t i = 0;
 
@@ -238,7 +252,8 @@ static drive_t take_earliest(struct pins *pins) {
     }
 }
 
-static void drives_due(board_t *b, uint64_t cycle) {
+static void drives_due(board_t *b, uint64_t cycle)
+{
     struct pins *pins = b->pins;
     while (pins->drive_count > 0 && pins->drive[0].cycle <= cycle) {
         drive_t drive = take_earliest(pins);
@@ -248,7 +263,8 @@ static void drives_due(board_t *b, uint64_t cycle) {
         event_at(b, EVENT_PIN_DRIVE, pins->drive[0].cycle, drives_due);
 }
 
-void board_pin_drive_at(board_t *b, board_pin_t pin, int level, uint64_t cycle) {
+void board_pin_drive_at(board_t *b, board_pin_t pin, int level, uint64_t cycle)
+{
     struct pins *pins = b->pins;
     size_t i = pins->drive_count;
 
@@ -269,7 +285,8 @@ void board_pin_drive_at(board_t *b, board_pin_t pin, int level, uint64_t cycle) 
 
 static void clocks_due(board_t *b, uint64_t cycle);
 
-static void plan_clocks(board_t *b) {
+static void plan_clocks(board_t *b)
+{
     uint64_t due = NEVER;
     for (int i = 0; i < CLOCKS_MAX; i++)
         if (b->pins->clock[i].due < due)
@@ -277,7 +294,8 @@ static void plan_clocks(board_t *b) {
     event_at(b, EVENT_PIN_CLOCK, due, clocks_due);
 }
 
-static void clocks_due(board_t *b, uint64_t cycle) {
+static void clocks_due(board_t *b, uint64_t cycle)
+{
     for (int i = 0; i < CLOCKS_MAX; i++) {
         pin_clock_t *clock = &b->pins->clock[i];
         if (clock->due > cycle)
@@ -289,7 +307,8 @@ static void clocks_due(board_t *b, uint64_t cycle) {
     plan_clocks(b);
 }
 
-void board_pin_clock(board_t *b, board_pin_t pin, double hz) {
+void board_pin_clock(board_t *b, board_pin_t pin, double hz)
+{
     pin_clock_t *clock = NULL;
     for (int i = 0; i < CLOCKS_MAX; i++)
         if (b->pins->clock[i].due != NEVER && b->pins->clock[i].pin == pin)
@@ -314,16 +333,19 @@ void board_pin_clock(board_t *b, board_pin_t pin, double hz) {
 
 /* -- for the tests ---------------------------------------------------------------------------------------------------- */
 
-void board_pin_drive(board_t *b, board_pin_t pin, int level) {
+void board_pin_drive(board_t *b, board_pin_t pin, int level)
+{
     pin_drive(b, pin, level, board_time(b));
 }
 
-int board_pin_level(const board_t *b, board_pin_t pin) {
+int board_pin_level(const board_t *b, board_pin_t pin)
+{
     timers_sync((board_t *)b, board_time(b)); /* edges that nobody watches are made late */
     return pin_level(b, pin);
 }
 
-void board_pin_wire(board_t *b, board_pin_t output, board_pin_t input) {
+void board_pin_wire(board_t *b, board_pin_t output, board_pin_t input)
+{
     struct pins *pins = b->pins;
     if (pins->wire_count == WIRES_MAX)
         abort();
@@ -336,7 +358,8 @@ void board_pin_wire(board_t *b, board_pin_t output, board_pin_t input) {
     timers_replan(b);
 }
 
-void board_record(board_t *b, board_pin_t pin, bool on) {
+void board_record(board_t *b, board_pin_t pin, bool on)
+{
     port_t *p = &b->pins->port[pin >> 3];
     timers_sync(b, board_time(b));
     if (on)
@@ -346,23 +369,27 @@ void board_record(board_t *b, board_pin_t pin, bool on) {
     timers_replan(b);
 }
 
-const board_edge_t *board_edges(const board_t *b, size_t *count) {
+const board_edge_t *board_edges(const board_t *b, size_t *count)
+{
     *count = b->pins->edge_count;
     return b->pins->edge;
 }
 
-void board_edges_clear(board_t *b) {
+void board_edges_clear(board_t *b)
+{
     b->pins->edge_count = 0;
 }
 
-void board_on_edge(board_t *b, void (*fn)(void *ctx, board_edge_t edge), void *ctx) {
+void board_on_edge(board_t *b, void (*fn)(void *ctx, board_edge_t edge), void *ctx)
+{
     b->pins->on_edge = fn;
     b->pins->on_edge_ctx = ctx;
 }
 
 /* -- life ------------------------------------------------------------------------------------------------------------ */
 
-void pins_init(board_t *b) {
+void pins_init(board_t *b)
+{
     b->pins = calloc(1, sizeof *b->pins);
     if (b->pins == NULL)
         abort();
@@ -378,7 +405,8 @@ void pins_init(board_t *b) {
 }
 
 /* All pins become inputs without pull-up; what the outside drives, it goes on driving. */
-void pins_reset(board_t *b) {
+void pins_reset(board_t *b)
+{
     for (int port = 0; port < PORTS; port++) {
         port_t *p = &b->pins->port[port];
         p->value = p->value_level = p->force_out = p->force_in = 0;
@@ -386,7 +414,8 @@ void pins_reset(board_t *b) {
     }
 }
 
-void pins_free(board_t *b) {
+void pins_free(board_t *b)
+{
     free(b->pins->drive);
     free(b->pins->edge);
     free(b->pins);

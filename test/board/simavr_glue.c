@@ -23,10 +23,11 @@
 
 #define MCU "atmega328p"
 
-#define NO_PERIPHERAL(name, type)             \
-    void name(avr_t *avr, type *peripheral) { \
-        (void)avr;                            \
-        (void)peripheral;                     \
+#define NO_PERIPHERAL(name, type)           \
+    void name(avr_t *avr, type *peripheral) \
+    {                                       \
+        (void)avr;                          \
+        (void)peripheral;                   \
     }
 
 NO_PERIPHERAL(avr_acomp_init, avr_acomp_t)
@@ -43,7 +44,8 @@ NO_PERIPHERAL(avr_watchdog_init, avr_watchdog_t)
 
 /* simavr reports an illegal opcode or an access outside memory only through its log. Everything else it says is about
  * its own life and is dropped. */
-static void listen_to_simavr(avr_t *avr, const int level, const char *format, va_list arguments) {
+static void listen_to_simavr(avr_t *avr, const int level, const char *format, va_list arguments)
+{
     board_t *b = avr ? avr->custom.data : NULL;
     (void)arguments;
     if (b == NULL || level != LOG_ERROR)
@@ -55,7 +57,8 @@ static void listen_to_simavr(avr_t *avr, const int level, const char *format, va
 }
 
 /* simavr passes WDR on as a request to its peripherals. */
-static int instruction_request(avr_io_t *io, uint32_t request, void *param) {
+static int instruction_request(avr_io_t *io, uint32_t request, void *param)
+{
     board_t *b = io->avr->custom.data;
     (void)param;
     if (request != AVR_IOCTL_WATCHDOG_RESET)
@@ -64,7 +67,8 @@ static int instruction_request(avr_io_t *io, uint32_t request, void *param) {
     return 0;
 }
 
-bool simavr_start(board_t *b) {
+bool simavr_start(board_t *b)
+{
     avr_global_logger_set(listen_to_simavr);
     b->avr = avr_make_mcu_by_name(MCU);
     if (b->avr == NULL) {

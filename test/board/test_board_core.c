@@ -72,6 +72,22 @@ static void test_an_interrupt_is_entered_in_four_cycles(void)
     TEST_ASSERT_EQUAL_UINT64(s + 1000 + 4, run_to_vector(VECTOR_OVF1));
 }
 
+static void test_the_return_address_is_the_next_instruction(void)
+{
+    uint64_t s;
+    uint64_t begin;
+    uint16_t sp;
+    start_remote();
+    allow_interrupts();
+    s = overflow_in(1000);
+    command(CMD_NOPS);
+    begin = run_to_label("nops", 100);
+    run_to_vector(VECTOR_OVF1);
+    sp = board_peek16(board, 0x5D);
+    TEST_ASSERT_EQUAL(address_of("nops") / 2u + (s + 1000 - begin),
+                      board_peek8(board, (uint16_t)(sp + 1)) << 8 | board_peek8(board, (uint16_t)(sp + 2)));
+}
+
 static void test_an_interrupt_out_of_sleep_takes_four_cycles_more(void)
 {
     uint64_t s;
@@ -514,6 +530,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_an_interrupt_is_entered_in_four_cycles);
+    RUN_TEST(test_the_return_address_is_the_next_instruction);
     RUN_TEST(test_an_interrupt_out_of_sleep_takes_four_cycles_more);
     RUN_TEST(test_one_instruction_runs_after_sei_and_after_reti_and_the_lower_vector_comes_first);
     RUN_TEST(test_a_flag_is_cleared_when_its_vector_is_entered);

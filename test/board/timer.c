@@ -3,7 +3,8 @@
 
 /* -- flags ---------------------------------------------------------------------------------------------------------- */
 
-static void update_lines(counter_t *t, uint64_t cycle) {
+static void update_lines(counter_t *t, uint64_t cycle)
+{
     board_t *b = t->board;
     uint8_t requested = REG(b, t->reg_tifr) & REG(b, t->reg_timsk);
     irq_set(b, t->vector_overflow, requested & FLAG_TOV, cycle);
@@ -13,7 +14,8 @@ static void update_lines(counter_t *t, uint64_t cycle) {
         irq_set(b, VECTOR_TIMER1_CAPT, requested & FLAG_ICF, cycle);
 }
 
-void timer_set_flags(counter_t *t, uint8_t flags, uint64_t cycle) {
+void timer_set_flags(counter_t *t, uint8_t flags, uint64_t cycle)
+{
     board_t *b = t->board;
     uint8_t fresh = flags & (uint8_t)~REG(b, t->reg_tifr);
     if (fresh == 0)
@@ -25,25 +27,24 @@ void timer_set_flags(counter_t *t, uint8_t flags, uint64_t cycle) {
 
 /* -- pins ------------------------------------------------------------------------------------------------------------ */
 
-static void show_latch(counter_t *t, const compare_t *c, uint64_t cycle) {
+static void show_latch(counter_t *t, const compare_t *c, uint64_t cycle)
+{
     pin_override(t->board, c->pin, c->connected ? PIN_VALUE : PIN_FREE, c->latch, cycle);
 }
 
-static bool after(pin_action_t action, bool latch) {
+static bool after(pin_action_t action, bool latch)
+{
     switch (action) {
-    case PIN_KEEPS:
-        return latch;
-    case PIN_CLEARS:
-        return false;
-    case PIN_SETS:
-        return true;
-    case PIN_TOGGLES:
-        return !latch;
+    case PIN_KEEPS: return latch;
+    case PIN_CLEARS: return false;
+    case PIN_SETS: return true;
+    case PIN_TOGGLES: return !latch;
     }
     return latch;
 }
 
-static void set_latch(counter_t *t, compare_t *c, bool level, uint64_t cycle) {
+static void set_latch(counter_t *t, compare_t *c, bool level, uint64_t cycle)
+{
     if (level == c->latch)
         return;
     c->latch = level;
@@ -52,14 +53,16 @@ static void set_latch(counter_t *t, compare_t *c, bool level, uint64_t cycle) {
 
 /* -- one tick -------------------------------------------------------------------------------------------------------- */
 
-static void load_buffers(counter_t *t) {
+static void load_buffers(counter_t *t)
+{
     t->compare[0].ocr = t->compare[0].buffer;
     t->compare[1].ocr = t->compare[1].buffer;
     if (t->top_from == TOP_OCRA)
         t->top = t->compare[0].ocr;
 }
 
-static pin_action_t match_action(const counter_t *t, const compare_t *c, uint16_t leaving) {
+static pin_action_t match_action(const counter_t *t, const compare_t *c, uint16_t leaving)
+{
     if (t->wave < WAVE_PHASE)
         return c->at_match;
     /* 16.9.4: at the extremes the output is constant, as if the match had come from the other side. */
@@ -70,7 +73,8 @@ static pin_action_t match_action(const counter_t *t, const compare_t *c, uint16_
     return t->down ? c->at_match_down : c->at_match;
 }
 
-static void tick(counter_t *t, uint64_t cycle) {
+static void tick(counter_t *t, uint64_t cycle)
+{
     const uint16_t leaving = t->count;
     const bool compares = !t->blocked;
     const bool at_top = compares && leaving == t->top;
@@ -132,13 +136,15 @@ static void tick(counter_t *t, uint64_t cycle) {
 
 /* -- many ticks ------------------------------------------------------------------------------------------------------ */
 
-static uint32_t least(uint32_t a, uint32_t b) {
+static uint32_t least(uint32_t a, uint32_t b)
+{
     return a < b ? a : b;
 }
 
 /* Ticks from now on that do nothing but count. A match whose flag is set already and whose pin is not connected does
  * nothing either. */
-static uint32_t quiet_ticks(const counter_t *t) {
+static uint32_t quiet_ticks(const counter_t *t)
+{
     const uint32_t v = t->count;
     const uint8_t flags = REG(t->board, t->reg_tifr);
     uint32_t quiet;
@@ -165,12 +171,14 @@ static uint32_t quiet_ticks(const counter_t *t) {
     return quiet;
 }
 
-static void move(counter_t *t, uint32_t ticks) {
+static void move(counter_t *t, uint32_t ticks)
+{
     t->count = (uint16_t)(t->down ? t->count - ticks : t->count + ticks);
 }
 
 /* The prescaler's k-th edge since its zero. */
-static uint64_t edge_cycle(const counter_t *t, uint64_t k) {
+static uint64_t edge_cycle(const counter_t *t, uint64_t k)
+{
     return t->prescaler->zero + (k << t->shift);
 }
 
@@ -178,7 +186,8 @@ static uint64_t edge_cycle(const counter_t *t, uint64_t k) {
  * so that long times are skipped at once. Only a timer that nobody watches gets here with many periods. */
 #define PERIODS_UNTIL_STEADY 3
 
-static void advance(counter_t *t, uint64_t ticks, uint64_t k) {
+static void advance(counter_t *t, uint64_t ticks, uint64_t k)
+{
     int periods = 0;
 
     while (ticks > 0) {
@@ -201,7 +210,8 @@ static void advance(counter_t *t, uint64_t ticks, uint64_t k) {
     }
 }
 
-void timer_sync(counter_t *t, uint64_t cycle) {
+void timer_sync(counter_t *t, uint64_t cycle)
+{
     if (cycle <= t->at)
         return;
     if (t->source == CLOCK_INTERNAL && !t->prescaler->held) {
@@ -213,14 +223,16 @@ void timer_sync(counter_t *t, uint64_t cycle) {
     t->at = cycle;
 }
 
-void timer_external_tick(counter_t *t, uint64_t cycle) {
+void timer_external_tick(counter_t *t, uint64_t cycle)
+{
     t->at = cycle;
     tick(t, cycle);
 }
 
 /* -- the next tick that somebody sees --------------------------------------------------------------------------------- */
 
-void timer_plan(counter_t *t) {
+void timer_plan(counter_t *t)
+{
     board_t *b = t->board;
     const uint8_t wanted = REG(b, t->reg_timsk) & (uint8_t)~REG(b, t->reg_tifr);
     const uint32_t v = t->count;
@@ -264,12 +276,14 @@ void timer_plan(counter_t *t) {
 
 /* -- what the registers do ------------------------------------------------------------------------------------------- */
 
-void timer_write_count(counter_t *t, uint16_t value) {
+void timer_write_count(counter_t *t, uint16_t value)
+{
     t->count = value;
     t->blocked = true; /* also while the clock is stopped */
 }
 
-void timer_write_compare(counter_t *t, int channel, uint16_t value) {
+void timer_write_compare(counter_t *t, int channel, uint16_t value)
+{
     compare_t *c = &t->compare[channel];
     c->buffer = value;
     if (timer_is_pwm(t))
@@ -279,7 +293,8 @@ void timer_write_compare(counter_t *t, int channel, uint16_t value) {
         t->top = value;
 }
 
-void timer_set_wave(counter_t *t, wave_t wave, top_from_t from, uint16_t fixed_top) {
+void timer_set_wave(counter_t *t, wave_t wave, top_from_t from, uint16_t fixed_top)
+{
     t->wave = wave;
     t->top_from = from;
     if (wave < WAVE_PHASE)
@@ -287,19 +302,14 @@ void timer_set_wave(counter_t *t, wave_t wave, top_from_t from, uint16_t fixed_t
     if (!timer_is_pwm(t))
         load_buffers(t); /* 16.7: outside PWM the buffers are transparent */
     switch (from) {
-    case TOP_FIXED:
-        t->top = fixed_top;
-        break;
-    case TOP_OCRA:
-        t->top = t->compare[0].ocr;
-        break;
-    case TOP_ICR:
-        t->top = t->icr;
-        break;
+    case TOP_FIXED: t->top = fixed_top; break;
+    case TOP_OCRA: t->top = t->compare[0].ocr; break;
+    case TOP_ICR: t->top = t->icr; break;
     }
 }
 
-void timer_set_output(counter_t *t, int channel, int com, bool may_toggle, uint64_t cycle) {
+void timer_set_output(counter_t *t, int channel, int com, bool may_toggle, uint64_t cycle)
+{
     compare_t *c = &t->compare[channel];
     const pin_action_t plain[4] = {PIN_KEEPS, PIN_TOGGLES, PIN_CLEARS, PIN_SETS};
     const pin_action_t inverse[4] = {PIN_KEEPS, PIN_TOGGLES, PIN_SETS, PIN_CLEARS};
@@ -314,32 +324,37 @@ void timer_set_output(counter_t *t, int channel, int com, bool may_toggle, uint6
 }
 
 /* 16.7.1: as a real match, but no flag and no clearing of the counter; PWM modes ignore it. */
-void timer_force_compare(counter_t *t, int channel, uint64_t cycle) {
+void timer_force_compare(counter_t *t, int channel, uint64_t cycle)
+{
     compare_t *c = &t->compare[channel];
     if (!timer_is_pwm(t) && c->connected)
         set_latch(t, c, after(c->at_match, c->latch), cycle);
 }
 
-void timer_set_clock(counter_t *t, clock_source_t source, int shift) {
+void timer_set_clock(counter_t *t, clock_source_t source, int shift)
+{
     t->source = source;
     t->shift = shift;
 }
 
 /* -- flag registers, the same in all three ----------------------------------------------------------------------------- */
 
-static counter_t *owner_of(board_t *b, uint16_t address) {
+static counter_t *owner_of(board_t *b, uint16_t address)
+{
     for (int i = 0; i < 3; i++)
         if (b->timers->timer[i].reg_tifr == address || b->timers->timer[i].reg_timsk == address)
             return &b->timers->timer[i];
     return NULL;
 }
 
-static uint8_t read_flags(board_t *b, uint16_t address, uint64_t cycle) {
+static uint8_t read_flags(board_t *b, uint16_t address, uint64_t cycle)
+{
     timer_sync(owner_of(b, address), cycle);
     return REG(b, address);
 }
 
-static void write_flags(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_flags(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     counter_t *t = owner_of(b, address);
     timer_sync(t, cycle);
     REG(b, address) &= (uint8_t)~reg_written_ones(b, value);
@@ -347,7 +362,8 @@ static void write_flags(board_t *b, uint16_t address, uint8_t value, uint64_t cy
     timer_plan(t);
 }
 
-static void write_mask(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_mask(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     counter_t *t = owner_of(b, address);
     timer_sync(t, cycle);
     REG(b, address) = value;
@@ -355,7 +371,8 @@ static void write_mask(board_t *b, uint16_t address, uint8_t value, uint64_t cyc
     timer_plan(t);
 }
 
-static void ack(board_t *b, int vector, uint64_t cycle) {
+static void ack(board_t *b, int vector, uint64_t cycle)
+{
     counter_t *t = &b->timers->timer[vector >= VECTOR_TIMER0_COMPA ? 0 : vector >= VECTOR_TIMER1_CAPT ? 1 : 2];
     uint8_t flag = vector == t->vector_overflow     ? FLAG_TOV
                    : vector == t->compare[0].vector ? FLAG_OCA
@@ -367,7 +384,8 @@ static void ack(board_t *b, int vector, uint64_t cycle) {
     timer_plan(t);
 }
 
-void timer_init(counter_t *t) {
+void timer_init(counter_t *t)
+{
     board_t *b = t->board;
     reg_on_read(b, t->reg_tifr, read_flags);
     reg_on_write(b, t->reg_tifr, write_flags);

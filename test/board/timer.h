@@ -100,7 +100,8 @@ void timer_set_output(counter_t *t, int channel, int com, bool may_toggle, uint6
 void timer_force_compare(counter_t *t, int channel, uint64_t cycle);
 void timer_set_clock(counter_t *t, clock_source_t source, int shift);
 void timer_set_flags(counter_t *t, uint8_t flags, uint64_t cycle);
-static inline bool timer_is_pwm(const counter_t *t) {
+static inline bool timer_is_pwm(const counter_t *t)
+{
     return t->wave >= WAVE_FAST;
 }
 

@@ -6,8 +6,8 @@
 #define REG_TCCR1C 0x82
 #define REG_TCNT1L 0x84
 #define REG_TCNT1H 0x85
-#define REG_ICR1L  0x86
-#define REG_ICR1H  0x87
+#define REG_ICR1L 0x86
+#define REG_ICR1H 0x87
 #define REG_OCR1AL 0x88
 #define REG_OCR1AH 0x89
 #define REG_OCR1BL 0x8A
@@ -16,12 +16,14 @@
 #define FOC_A 0x80
 #define FOC_B 0x40
 
-static counter_t *timer1(board_t *b) {
+static counter_t *timer1(board_t *b)
+{
     return &b->timers->timer[1];
 }
 
 /* Table 16-4: WGM13:0 */
-static void apply_control(counter_t *t, uint64_t cycle) {
+static void apply_control(counter_t *t, uint64_t cycle)
+{
     static const struct {
         wave_t wave;
         top_from_t from;
@@ -45,7 +47,8 @@ static void apply_control(counter_t *t, uint64_t cycle) {
 }
 
 /* Table 16-5: CS12:0 */
-static void apply_clock(counter_t *t) {
+static void apply_clock(counter_t *t)
+{
     static const int shift[6] = {0, 0, 3, 6, 8, 10};
     int cs = REG(t->board, REG_TCCR1B) & 7;
 
@@ -59,7 +62,8 @@ static void apply_clock(counter_t *t) {
     }
 }
 
-static void write_control(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_control(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     counter_t *t = timer1(b);
 
     timer_sync(t, cycle);
@@ -84,39 +88,36 @@ static void write_control(board_t *b, uint16_t address, uint8_t value, uint64_t 
 }
 
 /* 16.3: the high byte waits in TEMP, one for all, until the low byte is written: then both arrive together. */
-static void write_high(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_high(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     (void)address;
     (void)cycle;
     timer1(b)->temp = value;
 }
 
-static void write_low(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_low(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     counter_t *t = timer1(b);
     uint16_t both = (uint16_t)(t->temp << 8 | value);
 
     timer_sync(t, cycle);
     switch (address) {
-    case REG_TCNT1L:
-        timer_write_count(t, both);
-        break;
+    case REG_TCNT1L: timer_write_count(t, both); break;
     case REG_ICR1L: /* 16.6: writable only while it is TOP */
         if (t->top_from == TOP_ICR) {
             t->icr = both;
             t->top = both;
         }
         break;
-    case REG_OCR1AL:
-        timer_write_compare(t, 0, both);
-        break;
-    case REG_OCR1BL:
-        timer_write_compare(t, 1, both);
-        break;
+    case REG_OCR1AL: timer_write_compare(t, 0, both); break;
+    case REG_OCR1BL: timer_write_compare(t, 1, both); break;
     }
     timer_plan(t);
 }
 
 /* Reading the low byte of TCNT1 or ICR1 takes the high byte into TEMP; OCR1x is read without TEMP. */
-static uint8_t read_low(board_t *b, uint16_t address, uint64_t cycle) {
+static uint8_t read_low(board_t *b, uint16_t address, uint64_t cycle)
+{
     counter_t *t = timer1(b);
     uint16_t both;
 
@@ -126,19 +127,22 @@ static uint8_t read_low(board_t *b, uint16_t address, uint64_t cycle) {
     return (uint8_t)both;
 }
 
-static uint8_t read_high(board_t *b, uint16_t address, uint64_t cycle) {
+static uint8_t read_high(board_t *b, uint16_t address, uint64_t cycle)
+{
     (void)address;
     (void)cycle;
     return timer1(b)->temp;
 }
 
-static uint8_t read_compare(board_t *b, uint16_t address, uint64_t cycle) {
+static uint8_t read_compare(board_t *b, uint16_t address, uint64_t cycle)
+{
     uint16_t both = timer1(b)->compare[address >= REG_OCR1BL].buffer;
     (void)cycle;
     return (uint8_t)(address & 1 ? both >> 8 : both);
 }
 
-void timer16_init(counter_t *t) {
+void timer16_init(counter_t *t)
+{
     board_t *b = t->board;
 
     timer_init(t);

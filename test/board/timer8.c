@@ -8,18 +8,21 @@ enum { TCCRA, TCCRB, TCNT, OCRA, OCRB };
 
 #define FOC_A 0x80
 #define FOC_B 0x40
-#define WGM2  0x08
+#define WGM2 0x08
 
-static counter_t *owner_of(board_t *b, uint16_t address) {
+static counter_t *owner_of(board_t *b, uint16_t address)
+{
     return &b->timers->timer[address >= REG_TCCR2A ? 2 : 0];
 }
 
-static uint16_t base_of(const counter_t *t) {
+static uint16_t base_of(const counter_t *t)
+{
     return t->number == 2 ? REG_TCCR2A : REG_TCCR0A;
 }
 
 /* Table 15-8: WGM02:0 */
-static void apply_control(counter_t *t, uint64_t cycle) {
+static void apply_control(counter_t *t, uint64_t cycle)
+{
     static const struct {
         wave_t wave;
         top_from_t from;
@@ -37,7 +40,8 @@ static void apply_control(counter_t *t, uint64_t cycle) {
 }
 
 /* Tables 15-9 and 18-9: CSn2:0 */
-static void apply_clock(counter_t *t) {
+static void apply_clock(counter_t *t)
+{
     static const int shift0[6] = {0, 0, 3, 6, 8, 10};
     static const int shift2[8] = {0, 0, 3, 5, 6, 7, 8, 10};
     int cs = REG(t->board, base_of(t) + TCCRB) & 7;
@@ -52,7 +56,8 @@ static void apply_clock(counter_t *t) {
     }
 }
 
-static void write_register(board_t *board, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_register(board_t *board, uint16_t address, uint8_t value, uint64_t cycle)
+{
     counter_t *t = owner_of(board, address);
 
     timer_sync(t, cycle);
@@ -70,9 +75,7 @@ static void write_register(board_t *board, uint16_t address, uint8_t value, uint
             timer_force_compare(t, 1, cycle);
         apply_clock(t);
         break;
-    case TCNT:
-        timer_write_count(t, value);
-        break;
+    case TCNT: timer_write_count(t, value); break;
     case OCRA:
     case OCRB:
         REG(board, address) = value;
@@ -82,13 +85,15 @@ static void write_register(board_t *board, uint16_t address, uint8_t value, uint
     timer_plan(t);
 }
 
-static uint8_t read_count(board_t *board, uint16_t address, uint64_t cycle) {
+static uint8_t read_count(board_t *board, uint16_t address, uint64_t cycle)
+{
     counter_t *t = owner_of(board, address);
     timer_sync(t, cycle);
     return (uint8_t)t->count;
 }
 
-void timer8_init(counter_t *t) {
+void timer8_init(counter_t *t)
+{
     timer_init(t);
     for (uint16_t offset = TCCRA; offset <= OCRB; offset++)
         reg_on_write(t->board, (uint16_t)(base_of(t) + offset), write_register);

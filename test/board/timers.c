@@ -4,12 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define REG_GTCCR     0x43
-#define GTCCR_TSM     0x80
-#define GTCCR_PSRASY  0x02
+#define REG_GTCCR 0x43
+#define GTCCR_TSM 0x80
+#define GTCCR_PSRASY 0x02
 #define GTCCR_PSRSYNC 0x01
-#define REG_TCCR1B    0x81
-#define TCCR1B_ICES1  0x40
+#define REG_TCCR1B 0x81
+#define TCCR1B_ICES1 0x40
 
 /* 17.1: an edge of T0 or T1 reaches the counter after 2.5 to 3.5 cycles; the pads' edges lie on clock edges here. ICP1
  * goes through the same synchroniser and edge detector (16.6.1). */
@@ -17,33 +17,39 @@
 
 enum { EDGE_T0, EDGE_T1, EDGE_ICP };
 
-void timers_sync(board_t *b, uint64_t cycle) {
+void timers_sync(board_t *b, uint64_t cycle)
+{
     for (int i = 0; i < 3; i++)
         timer_sync(&b->timers->timer[i], cycle);
 }
 
-void timers_replan(board_t *b) {
+void timers_replan(board_t *b)
+{
     for (int i = 0; i < 3; i++)
         timer_plan(&b->timers->timer[i]);
 }
 
-static void timer0_due(board_t *b, uint64_t cycle) {
+static void timer0_due(board_t *b, uint64_t cycle)
+{
     timer_sync(&b->timers->timer[0], cycle);
     timer_plan(&b->timers->timer[0]);
 }
 
-static void timer1_due(board_t *b, uint64_t cycle) {
+static void timer1_due(board_t *b, uint64_t cycle)
+{
     timer_sync(&b->timers->timer[1], cycle);
     timer_plan(&b->timers->timer[1]);
 }
 
-static void timer2_due(board_t *b, uint64_t cycle) {
+static void timer2_due(board_t *b, uint64_t cycle)
+{
     timer_sync(&b->timers->timer[2], cycle);
     timer_plan(&b->timers->timer[2]);
 }
 
 /* 17.1, 17.4.1: PSRSYNC and PSRASY fall back by hardware unless TSM holds them, which also halts the timers. */
-static void write_gtccr(board_t *b, uint16_t address, uint8_t value, uint64_t cycle) {
+static void write_gtccr(board_t *b, uint16_t address, uint8_t value, uint64_t cycle)
+{
     struct timers *timers = b->timers;
     bool hold = value & GTCCR_TSM;
 
@@ -62,19 +68,23 @@ static void write_gtccr(board_t *b, uint16_t address, uint8_t value, uint64_t cy
 
 static void edge_due(board_t *b, int which, uint64_t cycle);
 
-static void t0_due(board_t *b, uint64_t cycle) {
+static void t0_due(board_t *b, uint64_t cycle)
+{
     edge_due(b, EDGE_T0, cycle);
 }
 
-static void t1_due(board_t *b, uint64_t cycle) {
+static void t1_due(board_t *b, uint64_t cycle)
+{
     edge_due(b, EDGE_T1, cycle);
 }
 
-static void icp_due(board_t *b, uint64_t cycle) {
+static void icp_due(board_t *b, uint64_t cycle)
+{
     edge_due(b, EDGE_ICP, cycle);
 }
 
-static void capture(counter_t *t, uint64_t cycle) {
+static void capture(counter_t *t, uint64_t cycle)
+{
     if (t->top_from == TOP_ICR)
         return; /* 16.6: no capture while ICR1 is TOP */
     timer_sync(t, cycle);
@@ -82,13 +92,15 @@ static void capture(counter_t *t, uint64_t cycle) {
     timer_set_flags(t, FLAG_ICF, cycle);
 }
 
-static void plan_edge(board_t *b, int which) {
+static void plan_edge(board_t *b, int which)
+{
     static const event_fn due[3] = {t0_due, t1_due, icp_due};
     if (b->timers->edge[which].count > 0)
         event_at(b, (event_slot_t)(EVENT_T0_EDGE + which), b->timers->edge[which].due[0], due[which]);
 }
 
-static void edge_due(board_t *b, int which, uint64_t cycle) {
+static void edge_due(board_t *b, int which, uint64_t cycle)
+{
     struct timers *timers = b->timers;
     counter_t *t = &timers->timer[which == EDGE_T0 ? 0 : 1];
 
@@ -102,7 +114,8 @@ static void edge_due(board_t *b, int which, uint64_t cycle) {
     plan_edge(b, which);
 }
 
-static void add_edge(board_t *b, int which, uint64_t cycle) {
+static void add_edge(board_t *b, int which, uint64_t cycle)
+{
     struct timers *timers = b->timers;
     if (timers->edge[which].count == 8)
         return; /* edges closer than a cycle are not seen */
@@ -110,19 +123,22 @@ static void add_edge(board_t *b, int which, uint64_t cycle) {
     plan_edge(b, which);
 }
 
-static void t0_changed(board_t *b, int level, uint64_t cycle) {
+static void t0_changed(board_t *b, int level, uint64_t cycle)
+{
     const counter_t *t = &b->timers->timer[0];
     if (t->source == CLOCK_EXTERNAL && t->external_rising == level)
         add_edge(b, EDGE_T0, cycle);
 }
 
-static void t1_changed(board_t *b, int level, uint64_t cycle) {
+static void t1_changed(board_t *b, int level, uint64_t cycle)
+{
     const counter_t *t = &b->timers->timer[1];
     if (t->source == CLOCK_EXTERNAL && t->external_rising == level)
         add_edge(b, EDGE_T1, cycle);
 }
 
-static void icp1_changed(board_t *b, int level, uint64_t cycle) {
+static void icp1_changed(board_t *b, int level, uint64_t cycle)
+{
     bool rising = REG(b, REG_TCCR1B) & TCCR1B_ICES1;
     if (rising == (bool)level)
         add_edge(b, EDGE_ICP, cycle);
@@ -130,12 +146,14 @@ static void icp1_changed(board_t *b, int level, uint64_t cycle) {
 
 /* -- life ------------------------------------------------------------------------------------------------------------ */
 
-void board_fast_pwm_tov(board_t *b, board_tov_t when) {
+void board_fast_pwm_tov(board_t *b, board_tov_t when)
+{
     b->timers->tov = when;
     timers_replan(b);
 }
 
-void timers_init(board_t *b) {
+void timers_init(board_t *b)
+{
     static const counter_t wired[3] = {
         {.number = 0,
          .max = 0xFF,
@@ -184,7 +202,8 @@ void timers_init(board_t *b) {
     pin_listen(b, BOARD_PIN('B', 0), icp1_changed);
 }
 
-void timers_reset(board_t *b) {
+void timers_reset(board_t *b)
+{
     struct timers *timers = b->timers;
     uint64_t cycle = board_time(b);
 
@@ -214,6 +233,7 @@ void timers_reset(board_t *b) {
     }
 }
 
-void timers_free(board_t *b) {
+void timers_free(board_t *b)
+{
     free(b->timers);
 }
