@@ -18,7 +18,7 @@
 #include "trace.h"
 
 #define CYCLES_PER_MS (BOARD_CPU_HZ / 1000)
-#define NS_PER_MS     INT64_C(1000000)
+#define NS_PER_MS INT64_C(1000000)
 
 enum {
     STATUS_MS = 100,       /* host's time between two status lines */
@@ -71,22 +71,26 @@ typedef struct {
 
 static volatile sig_atomic_t end_signal, window_changed, stop_asked;
 
-static void on_end(int number) {
+static void on_end(int number)
+{
     end_signal = number;
     console_abandon();
 }
 
-static void on_window(int number) {
+static void on_window(int number)
+{
     (void)number;
     window_changed = 1;
 }
 
-static void on_stop(int number) {
+static void on_stop(int number)
+{
     (void)number;
     stop_asked = 1;
 }
 
-static void catch (int number, void (*handler)(int)) {
+static void handle(int number, void (*handler)(int))
+{
     struct sigaction action = {.sa_handler = handler}; /* without SA_RESTART: sleeps and writes are to end */
     struct sigaction before;
 
@@ -96,21 +100,23 @@ static void catch (int number, void (*handler)(int)) {
     }
 }
 
-static void catch_signals(void) {
+static void catch_signals(void)
+{
     static const int ends[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT};
 
     for (size_t i = 0; i < sizeof ends / sizeof ends[0]; i++) {
-        catch (ends[i], on_end);
+        handle(ends[i], on_end);
     }
-    catch (SIGWINCH, on_window);
-    catch (SIGTSTP, on_stop);
+    handle(SIGWINCH, on_window);
+    handle(SIGTSTP, on_stop);
     signal(SIGPIPE, SIG_IGN);
 }
 
 /* -- what is said ------------------------------------------------------------------------------------------------ */
 
 /* A short message: in the status line if there is one, else on stderr. */
-static void __attribute__((format(printf, 2, 3))) notice(session_t *s, const char *format, ...) {
+static void __attribute__((format(printf, 2, 3))) notice(session_t *s, const char *format, ...)
+{
     va_list arguments;
 
     va_start(arguments, format);
@@ -124,7 +130,8 @@ static void __attribute__((format(printf, 2, 3))) notice(session_t *s, const cha
     }
 }
 
-static const char *state_name(const session_t *s) {
+static const char *state_name(const session_t *s)
+{
     /* the order of motion_state_t in firmware/motion/engine.h */
     static const char *const names[] = {"STANDBY", "ACCEL", "CRUISE", "DECEL", "STOP"};
     uint8_t state;
@@ -136,12 +143,14 @@ static const char *state_name(const session_t *s) {
     return state < sizeof names / sizeof names[0] ? names[state] : "?";
 }
 
-static bool standing(const session_t *s) {
+static bool standing(const session_t *s)
+{
     return s->has_state && board_peek8(s->board, s->state_address) == 0;
 }
 
 /* Simulated over real time, during the last second. */
-static double relative_speed(session_t *s, int64_t now, uint64_t cycle) {
+static double relative_speed(session_t *s, int64_t now, uint64_t cycle)
+{
     unsigned i = s->speed_next % SPEED_WINDOW;
     int64_t ns = s->speed[i].ns;
     double speed = 0.0;
@@ -167,7 +176,8 @@ typedef struct {
 } status_line_t;
 
 /* Appends a field; from the first on that does not fit, all are left out: the ones that come first matter most. */
-static void __attribute__((format(printf, 2, 3))) field(status_line_t *line, const char *format, ...) {
+static void __attribute__((format(printf, 2, 3))) field(status_line_t *line, const char *format, ...)
+{
     size_t room = console_columns() - line->length;
     va_list arguments;
     int length;
@@ -183,7 +193,8 @@ static void __attribute__((format(printf, 2, 3))) field(status_line_t *line, con
     }
 }
 
-static void show_status(session_t *s, int64_t now) {
+static void show_status(session_t *s, int64_t now)
+{
     uint64_t cycle = board_cycle(s->board);
     double rate = meter_read(&s->meter, cycle, standing(s));
     double speed = relative_speed(s, now, cycle);
@@ -217,7 +228,8 @@ static void show_status(session_t *s, int64_t now) {
     console_status(line.text);
 }
 
-static void show_help(const session_t *s) {
+static void show_help(const session_t *s)
+{
     (void)s;
     console_print("");
     for (size_t i = 0; keys_help[i] != NULL; i++) {
@@ -225,7 +237,8 @@ static void show_help(const session_t *s) {
     }
 }
 
-static void banner(const session_t *s) {
+static void banner(const session_t *s)
+{
     char line[256];
 
     if (s->pty != NULL) {
@@ -242,7 +255,8 @@ static void banner(const session_t *s) {
 
 /* -- the board's side -------------------------------------------------------------------------------------------- */
 
-static void on_edge(void *context, board_edge_t edge) {
+static void on_edge(void *context, board_edge_t edge)
+{
     session_t *s = context;
 
     if (edge.pin == s->clk) {
@@ -257,11 +271,13 @@ static void on_edge(void *context, board_edge_t edge) {
     }
 }
 
-static uint8_t level_of(const session_t *s, board_pin_t pin) {
+static uint8_t level_of(const session_t *s, board_pin_t pin)
+{
     return board_pin_level(s->board, pin) > 0;
 }
 
-static bool open_trace(session_t *s, const char *path, trace_format_t format) {
+static bool open_trace(session_t *s, const char *path, trace_format_t format)
+{
     uint8_t levels[OPTIONS_POSTS_MAX];
 
     for (size_t i = 0; i < s->o->pin_count; i++) {
@@ -275,13 +291,15 @@ static bool open_trace(session_t *s, const char *path, trace_format_t format) {
     return true;
 }
 
-static bool ends_in(const char *text, const char *end) {
+static bool ends_in(const char *text, const char *end)
+{
     size_t length = strlen(text), tail = strlen(end);
 
     return length >= tail && strcmp(text + length - tail, end) == 0;
 }
 
-static bool open_traces(session_t *s) {
+static bool open_traces(session_t *s)
+{
     const options_t *o = s->o;
 
     if (o->edges != NULL && !open_trace(s, o->edges, ends_in(o->edges, ".csv") ? TRACE_CSV : TRACE_COMPACT)) {
@@ -298,7 +316,8 @@ static bool open_traces(session_t *s) {
     return true;
 }
 
-static bool open_board(session_t *s) {
+static bool open_board(session_t *s)
+{
     const options_t *o = s->o;
 
     if (access(o->image, R_OK) != 0) {
@@ -332,7 +351,8 @@ static bool open_board(session_t *s) {
 }
 
 /* Passes on what the board has sent since the last call. */
-static void take_output(session_t *s) {
+static void take_output(session_t *s)
+{
     size_t count;
     const board_uart_byte_t *received = board_uart_received(s->board, &count);
     uint8_t bytes[256];
@@ -359,7 +379,8 @@ static void take_output(session_t *s) {
     }
 }
 
-static void send_byte(session_t *s, uint8_t byte) {
+static void send_byte(session_t *s, uint8_t byte)
+{
     uint64_t now = board_cycle(s->board);
 
     board_uart_send(s->board, &byte, 1);
@@ -371,36 +392,40 @@ static void send_byte(session_t *s, uint8_t byte) {
 
 /* How many bytes the line can still take until that cycle: more than these stay where they come from, so that a reset
  * or the end of the program finds nothing stale in between. */
-static size_t room_on_line(const session_t *s, uint64_t until) {
+static size_t room_on_line(const session_t *s, uint64_t until)
+{
     uint64_t now = board_cycle(s->board);
     uint64_t from = s->line_free_cycle > now ? s->line_free_cycle : now;
 
     return from >= until ? 0 : 1 + (size_t)((double)(until - from) / s->cycles_per_byte);
 }
 
-static void reset(session_t *s, board_reset_t cause) {
+static void reset(session_t *s, board_reset_t cause)
+{
     board_reset(s->board, cause);
 }
 
 /* -- the user's side ---------------------------------------------------------------------------------------------- */
 
-static void end(session_t *s, int code) {
+static void end(session_t *s, int code)
+{
     if (!s->done) {
         s->done = true;
         s->code = code;
     }
 }
 
-static void hold(session_t *s, board_pin_t pin, bool *held, const char *what) {
+static void hold(session_t *s, board_pin_t pin, bool *held, const char *what)
+{
     *held = !*held;
     board_pin_drive(s->board, pin, *held ? 0 : -1);
     notice(s, "%s %s", what, *held ? "grounded" : "released");
 }
 
-static void own_key(session_t *s, keys_action_t action, uint8_t key) {
+static void own_key(session_t *s, keys_action_t action, uint8_t key)
+{
     switch (action) {
-    case KEYS_NOTHING:
-        break;
+    case KEYS_NOTHING: break;
     case KEYS_BYTE:
         if (s->pty == NULL) {
             send_byte(s, key);
@@ -413,9 +438,7 @@ static void own_key(session_t *s, keys_action_t action, uint8_t key) {
             notice(s, "the Nano's terminal is at %s; Ctrl-C quits, Ctrl-] ? lists the keys", s->pty->name);
         }
         break;
-    case KEYS_QUIT:
-        end(s, EXIT_SUCCESS);
-        break;
+    case KEYS_QUIT: end(s, EXIT_SUCCESS); break;
     case KEYS_RESET:
         reset(s, BOARD_RESET_EXTERNAL);
         notice(s, "reset");
@@ -424,30 +447,21 @@ static void own_key(session_t *s, keys_action_t action, uint8_t key) {
         reset(s, BOARD_RESET_POWER_ON);
         notice(s, "power off and on");
         break;
-    case KEYS_ESTOP:
-        hold(s, s->estop, &s->estop_held, "Estop");
-        break;
-    case KEYS_FACTORY:
-        hold(s, s->factory, &s->factory_held, "RST");
-        break;
+    case KEYS_ESTOP: hold(s, s->estop, &s->estop_held, "Estop"); break;
+    case KEYS_FACTORY: hold(s, s->factory, &s->factory_held, "RST"); break;
     case KEYS_SYNC:
         board_pin_drive(s->board, s->sync, 0);
         board_pin_drive_at(s->board, s->sync, -1, board_cycle(s->board) + SYNC_MS * CYCLES_PER_MS);
         notice(s, "sync grounded for %d ms", SYNC_MS);
         break;
-    case KEYS_STATUS:
-        console_set_status(!console_has_status());
-        break;
-    case KEYS_HELP:
-        show_help(s);
-        break;
-    case KEYS_UNKNOWN:
-        notice(s, "Ctrl-] ? lists the keys");
-        break;
+    case KEYS_STATUS: console_set_status(!console_has_status()); break;
+    case KEYS_HELP: show_help(s); break;
+    case KEYS_UNKNOWN: notice(s, "Ctrl-] ? lists the keys"); break;
     }
 }
 
-static void read_keys(session_t *s, uint64_t until) {
+static void read_keys(session_t *s, uint64_t until)
+{
     uint8_t keys[64];
     size_t max = s->pty == NULL ? room_on_line(s, until) : sizeof keys;
     ssize_t got;
@@ -466,14 +480,16 @@ static void read_keys(session_t *s, uint64_t until) {
 }
 
 /* Piped input begins when the firmware has said hello: a port that has just been opened loses what comes earlier. */
-static bool said_hello(const session_t *s) {
+static bool said_hello(const session_t *s)
+{
     uint64_t cycle = board_cycle(s->board);
 
     return (s->last_output_cycle > 0 && cycle - s->last_output_cycle > HELLO_QUIET_MS * CYCLES_PER_MS) ||
            cycle > HELLO_LIMIT_MS * CYCLES_PER_MS;
 }
 
-static void read_pipe(session_t *s, uint64_t until) {
+static void read_pipe(session_t *s, uint64_t until)
+{
     struct pollfd ask = {.fd = STDIN_FILENO, .events = POLLIN};
     uint8_t bytes[256];
     size_t max;
@@ -497,7 +513,8 @@ static void read_pipe(session_t *s, uint64_t until) {
     }
 }
 
-static void read_pty(session_t *s, uint64_t until) {
+static void read_pty(session_t *s, uint64_t until)
+{
     uint8_t bytes[256];
     size_t max;
 
@@ -520,7 +537,8 @@ static void read_pty(session_t *s, uint64_t until) {
     }
 }
 
-static void read_input(session_t *s, uint64_t until) {
+static void read_input(session_t *s, uint64_t until)
+{
     if (console_keys()) {
         read_keys(s, until);
     } else if (s->pty == NULL) {
@@ -534,7 +552,8 @@ static void read_input(session_t *s, uint64_t until) {
 /* -- the run ------------------------------------------------------------------------------------------------------ */
 
 /* After the end of a piped input: whether nothing has happened on the board for long enough. */
-static bool idle(const session_t *s) {
+static bool idle(const session_t *s)
+{
     uint64_t last = s->line_free_cycle;
 
     if (!s->input_ended || level_of(s, s->opsa) || (s->has_state && !standing(s))) {
@@ -545,7 +564,8 @@ static bool idle(const session_t *s) {
     return board_cycle(s->board) > last + (uint64_t)(s->o->linger_ms * (double)CYCLES_PER_MS);
 }
 
-static void look_at_signals(session_t *s) {
+static void look_at_signals(session_t *s)
+{
     if (end_signal != 0) {
         end(s, -end_signal);
     }
@@ -563,7 +583,8 @@ static void look_at_signals(session_t *s) {
     }
 }
 
-static void look_at_clock(session_t *s) {
+static void look_at_clock(session_t *s)
+{
     int64_t now = pace_now_ns();
 
     if (now >= s->next_status_ns) {
@@ -585,7 +606,8 @@ static void look_at_clock(session_t *s) {
     }
 }
 
-static void run(session_t *s) {
+static void run(session_t *s)
+{
     uint64_t limit = s->o->for_seconds > 0.0 ? (uint64_t)(s->o->for_seconds * (double)BOARD_CPU_HZ) : UINT64_MAX;
 
     pace_start(&s->pace, s->o->fast, board_cycle(s->board));
@@ -619,7 +641,8 @@ static void run(session_t *s) {
     }
 }
 
-static void finish(session_t *s) {
+static void finish(session_t *s)
+{
     console_restore();
     if (console_screen()) {
         console_print("");
@@ -643,7 +666,8 @@ static void finish(session_t *s) {
     }
 }
 
-int session_run(const options_t *o) {
+int session_run(const options_t *o)
+{
     static session_t s; /* large, and one is enough */
     static pty_t pty;
 
