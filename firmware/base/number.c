@@ -1,18 +1,22 @@
 #include "base/number.h"
 #include "base/flash.h"
 
+/* Byte by byte: one 8-bit multiplication each, and what the last one carries out is the overflow. */
 bool number_add_digit(uint32_t *value, uint8_t digit)
 {
-    uint32_t v = *value;
-    if (v > 429496729u || (v == 429496729u && digit > 5)) {
+    _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "the bytes are taken from the lowest");
+    uint8_t *bytes = (uint8_t *)value;
+    const uint16_t product_0 = (uint16_t)(bytes[0] * 10u + digit);
+    const uint16_t product_1 = (uint16_t)(bytes[1] * 10u + (product_0 >> 8));
+    const uint16_t product_2 = (uint16_t)(bytes[2] * 10u + (product_1 >> 8));
+    const uint16_t product_3 = (uint16_t)(bytes[3] * 10u + (product_2 >> 8));
+    if (product_3 >> 8) {
         return false;
     }
-    v += v; /* by additions: the compiler would call a 32-bit multiplication */
-    const uint32_t twice = v;
-    v += v;
-    v += v;
-    v += twice;
-    *value = v + digit;
+    bytes[0] = (uint8_t)product_0;
+    bytes[1] = (uint8_t)product_1;
+    bytes[2] = (uint8_t)product_2;
+    bytes[3] = (uint8_t)product_3;
     return true;
 }
 

@@ -38,14 +38,14 @@ static bool is_end(char c)
 static status_t command_motion(const char *rest)
 {
     (void)rest; /* read ahead */
-    session_t defaults = session;
-    status_t status = motion_syntax_end(&ahead, &defaults);
-    refused_range = ahead.range;
+    status_t status = motion_syntax_end(&ahead);
     if (status == STATUS_OK) {
         status = queue_add(&ahead.command);
     }
     if (status == STATUS_OK) {
-        session = defaults;
+        motion_syntax_keep(&ahead, &session);
+    } else {
+        refused_range = ahead.range;
     }
     return status;
 }
@@ -57,8 +57,12 @@ static status_t command_session_value(const char *rest)
     for (; *rest != '\0'; rest++) {
         motion_syntax_take(&ahead, *rest);
     }
-    const status_t status = motion_syntax_end(&ahead, &session);
-    refused_range = ahead.range;
+    const status_t status = motion_syntax_end(&ahead);
+    if (status == STATUS_OK) {
+        motion_syntax_keep(&ahead, &session);
+    } else {
+        refused_range = ahead.range;
+    }
     return status;
 }
 
@@ -262,22 +266,24 @@ void commands_read_ahead(const char *line, uint8_t length)
         characters_ahead = 0;
         return;
     }
-    if (characters_ahead == 0 || characters_ahead > length) {
+    uint8_t i = characters_ahead;
+    if (i == 0 || i > length) {
         motion_syntax_begin(&ahead, line[0], &session);
-        characters_ahead = 1;
+        i = 1;
     }
-    while (characters_ahead < length) {
-        motion_syntax_take(&ahead, line[characters_ahead++]);
+    for (; i < length; i++) {
+        motion_syntax_take(&ahead, line[i]);
     }
+    characters_ahead = length;
 }
 
 status_t commands_execute(const char *line, uint8_t length, const char **range)
 {
     commands_read_ahead(line, length);
-    characters_ahead = 0;
-    refused_range = 0;
     status_t status = STATUS_OK;
-    if (line[0] >= '0' && line[0] <= '9') {
+    if (characters_ahead != 0) {
+        status = command_motion(line); /* it has been recognized by its first letter; time counts */
+    } else if (line[0] >= '0' && line[0] <= '9') {
         status = STATUS_NOT_YET; /* a network address: TRM-006 */
     } else if (!is_end(line[0])) {
         if (line[0] == '$') {
@@ -285,6 +291,7 @@ status_t commands_execute(const char *line, uint8_t length, const char **range)
         }
         status = dispatch(line);
     }
+    characters_ahead = 0;
     *range = refused_range;
     return status;
 }

@@ -14,8 +14,8 @@
 
 void commands_init(void);
 
-/* Reads ahead in the line that is being typed, so that little is left to do at its end. Optional; call it after each
- * change of the line. */
+/* Reads ahead in the line that is being typed, so that little is left to do at its end. Optional; what was read stays
+ * read, so call it after every character that was taken back. */
 void commands_read_ahead(const char *line, uint8_t length);
 
 /* Executes a line; a blank one, or one that begins with a space, does nothing. */

@@ -34,6 +34,8 @@ static const char queue_footer[] FLASH =
     "======================================================================\r\n"
     "Q is at ";
 static const char queue_legend[] FLASH = "\t+ pulse\t\t\t* linear\t\ts sync\r\n";
+static const char queue_cw[] FLASH = "CW\t";
+static const char queue_ccw[] FLASH = "CCW\t";
 static const char queue_executing[] FLASH = "executing ";
 
 /* Values of row. */
@@ -53,32 +55,34 @@ static bool queue_cell(uint8_t position)
     switch (column++) {
     case 0:
         text_put_u32(position);
-        text_put("\t");
+        terminal_port_put('\t');
         text_put_u32(entry->count);
-        text_put("\t");
+        terminal_port_put('\t');
         return true;
     case 1:
-        text_put(entry->flags & MOTION_PULSES ? "+" : " ");
-        text_put(entry->flags & MOTION_CCW ? "CCW\t" : "CW\t");
+        terminal_port_put(entry->flags & MOTION_PULSES ? '+' : ' ');
+        text_put_flash(entry->flags & MOTION_CCW ? queue_ccw : queue_cw);
         text_put_u32(command_rpm(entry));
-        text_put("\t");
+        terminal_port_put('\t');
         return true;
     case 2:
         text_put_u32(command_cycle_us(entry));
-        text_put("\t");
+        terminal_port_put('\t');
         return true;
     case 3:
-        text_put(entry->flags & MOTION_LINEAR ? "*" : " ");
+        terminal_port_put(entry->flags & MOTION_LINEAR ? '*' : ' ');
         text_put_accel(entry->accel);
-        text_put("\t");
+        terminal_port_put('\t');
         return true;
     case 4:
         text_put_accel(entry->decel);
-        text_put("\t");
+        terminal_port_put('\t');
         return true;
     case 5:
         text_put_u32(entry->extra_pulses);
-        text_put(entry->flags & MOTION_SYNC ? "\ts " : "\t  ");
+        terminal_port_put('\t');
+        terminal_port_put(entry->flags & MOTION_SYNC ? 's' : ' ');
+        terminal_port_put(' ');
         return true;
     default:
         text_put_u32(entry->start_wait_us);
@@ -176,7 +180,7 @@ static bool velocity_piece(void)
     uint32_t rpm, cycle_us;
     engine_velocity(&rpm, &cycle_us);
     text_put_u32(rpm);
-    text_put(" ");
+    terminal_port_put(' ');
     text_put_u32(cycle_us);
     text_new_line();
     return false;
@@ -194,7 +198,7 @@ static bool position_piece(void)
     case 0:
         text_put_flash(position_text);
         text_put_i32(engine_position());
-        text_put(" ");
+        terminal_port_put(' ');
         return true;
     default:
         text_put_flash(state_words[engine_state()]);
@@ -216,7 +220,7 @@ static bool help_piece(void)
             return false;
         }
         text_put_flash(form);
-        text_put("\t");
+        terminal_port_put('\t');
         column = 1;
         return true;
     }

@@ -19,7 +19,7 @@ static line_event_t append(line_t *line, char character)
     }
     line->text[line->length++] = character;
     line->text[line->length] = '\0';
-    return LINE_EDITED;
+    return LINE_APPENDED;
 }
 
 line_event_t line_take(line_t *line, uint8_t byte)
@@ -35,7 +35,7 @@ line_event_t line_take(line_t *line, uint8_t byte)
     }
     if ((byte == BACKSPACE || byte == DELETE) && line->length > 0) {
         line->text[--line->length] = '\0';
-        return LINE_EDITED;
+        return LINE_ERASED;
     }
     if (byte == ESCAPE && !line_is_blank(line)) {
         line_reset(line);

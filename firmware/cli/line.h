@@ -16,17 +16,18 @@
 #define LINE_CHARACTERS 64
 
 typedef struct {
-    char text[LINE_CHARACTERS + 1]; /* NUL-terminated whenever line_take() has returned */
     uint8_t length;
     status_t status;   /* not STATUS_OK: the line will be refused */
     bool after_return; /* a LF now belongs to the CR before it */
+    char text[LINE_CHARACTERS + 1]; /* NUL-terminated whenever line_take() has returned */
 } line_t;
 
 typedef enum {
     LINE_UNCHANGED,
-    LINE_EDITED,  /* one character more or less: look at length */
-    LINE_CLEARED, /* by ESC */
-    LINE_ENDED,   /* text and status stand until line_reset() */
+    LINE_APPENDED, /* one character more */
+    LINE_ERASED,   /* one character less */
+    LINE_CLEARED,  /* by ESC */
+    LINE_ENDED,    /* text and status stand until line_reset() */
 } line_event_t;
 
 void line_reset(line_t *line); /* empty, for the next line */

@@ -1,5 +1,6 @@
 #include "cli/motion_syntax.h"
 #include "base/flash.h"
+#include "base/inline.h"
 #include "base/number.h"
 #include "motion/engine.h"
 #include "settings.h"
@@ -33,6 +34,7 @@ enum {
     HAS_MINUS = 1 << 2,
     NOT_ZERO = 1 << 3,  /* a digit other than 0, even beyond the decimals that count */
     NO_MORE = 1 << 4,   /* further decimals do not count */
+    NO_NUMBER = 1 << 5, /* none may follow */
 };
 
 /* motion_syntax_t.given */
@@ -68,7 +70,7 @@ static void open_parameter(motion_syntax_t *syntax, uint8_t parameter)
 {
     syntax->parameter = parameter;
     syntax->value = 0;
-    syntax->number = 0;
+    syntax->number = flash_u8(&parameter_number[parameter]) == NUMBER_NONE ? NO_NUMBER : 0;
     syntax->places = 0;
 }
 
@@ -197,27 +199,20 @@ static void close_parameter(motion_syntax_t *syntax)
     }
 }
 
-static void take_digit(motion_syntax_t *syntax, uint8_t digit)
+/* A digit that is not simply one more of a whole number. */
+static NOINLINE void take_special_digit(motion_syntax_t *syntax, uint8_t digit)
 {
-    if (syntax->parameter == PARAMETER_FULL_STEP || syntax->parameter == PARAMETER_PULSES) {
+    if (syntax->number & NO_NUMBER) {
         refuse(syntax, STATUS_SYNTAX);
         return;
-    }
-    syntax->number |= HAS_DIGIT;
-    if (digit != 0) {
-        syntax->number |= NOT_ZERO;
     }
     if (syntax->number & NO_MORE) {
         return;
     }
-    if (!number_add_digit(&syntax->value, digit)) {
-        refuse(syntax, STATUS_NUMBER_TOO_LARGE);
-    }
-    if (syntax->number & HAS_POINT) {
-        syntax->places++;
-        if (syntax->places == 2) {
-            syntax->number |= NO_MORE;
-        }
+    number_add_digit(&syntax->value, digit); /* at most 99.99 */
+    syntax->places++;
+    if (syntax->places == 2) {
+        syntax->number |= NO_MORE;
     }
 }
 
@@ -277,16 +272,9 @@ void motion_syntax_begin(motion_syntax_t *syntax, char first_letter, const sessi
     syntax->single = syntax->parameter != PARAMETER_COUNT;
 }
 
-void motion_syntax_take(motion_syntax_t *syntax, char character)
+static NOINLINE void take_other(motion_syntax_t *syntax, uint8_t c)
 {
-    if (syntax->status != STATUS_OK || (syntax->given & ENDED)) {
-        return;
-    }
-    const uint8_t c = (uint8_t)character;
-    const uint8_t digit = (uint8_t)(c - '0');
-    if (digit < 10) {
-        take_digit(syntax, digit);
-    } else if (c == '.') {
+    if (c == '.') {
         take_point(syntax);
     } else if (c == '-') {
         take_minus(syntax);
@@ -294,6 +282,25 @@ void motion_syntax_take(motion_syntax_t *syntax, char character)
         syntax->given |= ENDED;
     } else {
         take_letter(syntax, (uint8_t)((c | 0x20) - 'a'));
+    }
+}
+
+void motion_syntax_take(motion_syntax_t *syntax, char character)
+{
+    if (syntax->status != STATUS_OK || (syntax->given & ENDED)) {
+        return;
+    }
+    const uint8_t digit = (uint8_t)(character - '0');
+    if (digit >= 10) {
+        take_other(syntax, (uint8_t)character);
+        return;
+    }
+    const uint8_t before = syntax->number;
+    syntax->number = (uint8_t)(before | (digit != 0 ? HAS_DIGIT | NOT_ZERO : HAS_DIGIT));
+    if (before & (NO_NUMBER | HAS_POINT)) {
+        take_special_digit(syntax, digit);
+    } else if (!number_add_digit(&syntax->value, digit)) {
+        syntax->status = STATUS_NUMBER_TOO_LARGE;
     }
 }
 
@@ -311,7 +318,7 @@ static void resolve_ramp(motion_syntax_t *syntax)
     }
 }
 
-status_t motion_syntax_end(motion_syntax_t *syntax, session_t *defaults)
+status_t motion_syntax_end(motion_syntax_t *syntax)
 {
     motion_command_t *command = &syntax->command;
     if (syntax->status == STATUS_OK) {
@@ -326,13 +333,15 @@ status_t motion_syntax_end(motion_syntax_t *syntax, session_t *defaults)
     } else if (command->count == 0) {
         return STATUS_NOT_YET; /* continuous motion */
     }
-    const bool ramp_alone = syntax->single && (syntax->parameter == PARAMETER_ACCEL || syntax->parameter == PARAMETER_DECEL);
-    const status_t status = ramp_alone ? STATUS_OK : engine_check(command);
-    if (status == STATUS_OK) {
-        defaults->velocity = command->velocity;
-        defaults->accel = command->accel;
-        defaults->decel = command->decel;
-        defaults->flags = command->flags & SESSION_FLAGS;
-    }
-    return status;
+    const bool ramp_alone =
+        syntax->single && (syntax->parameter == PARAMETER_ACCEL || syntax->parameter == PARAMETER_DECEL);
+    return ramp_alone ? STATUS_OK : engine_check(command);
+}
+
+void motion_syntax_keep(const motion_syntax_t *syntax, session_t *defaults)
+{
+    defaults->velocity = syntax->command.velocity;
+    defaults->accel = syntax->command.accel;
+    defaults->decel = syntax->command.decel;
+    defaults->flags = syntax->command.flags & SESSION_FLAGS;
 }

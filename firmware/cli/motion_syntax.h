@@ -41,8 +41,10 @@ void motion_syntax_begin(motion_syntax_t *syntax, char first_letter, const sessi
 /* The next character of the line. */
 void motion_syntax_take(motion_syntax_t *syntax, char character);
 
-/* The end of the line. STATUS_OK: syntax->command is complete and executable, and *defaults holds the session defaults
- * that follow from it (untouched otherwise). */
-status_t motion_syntax_end(motion_syntax_t *syntax, session_t *defaults);
+/* The end of the line. STATUS_OK: syntax->command is complete and executable. */
+status_t motion_syntax_end(motion_syntax_t *syntax);
+
+/* What a complete command leaves as session defaults: all but count, direction, sync, start wait and extra pulses. */
+void motion_syntax_keep(const motion_syntax_t *syntax, session_t *defaults);
 
 #endif

@@ -1,5 +1,6 @@
 #include "cli/terminal.h"
 #include "base/flash.h"
+#include "base/inline.h"
 #include "cli/commands.h"
 #include "cli/display.h"
 #include "cli/line.h"
@@ -11,6 +12,9 @@
 
 /* The longest answer: CR LF, an error with its range, CR LF, the prompt. */
 enum { ANSWER_BYTES = 36 };
+
+/* At a high rate several bytes are taken in one round of the main loop, but never more than one line. */
+enum { BYTES_AT_ONCE = 4 };
 
 static const char version_line[] FLASH = "SAC " VERSION_NUMBER " " VERSION_DATE "\r\n";
 static const char prompt[] FLASH = "SAC>";
@@ -37,12 +41,12 @@ enum { TIMES_BYTES = 9 + 10 + 12 + 10 + 5 };
 
 static void put_error(status_t status, const char *range)
 {
-    text_put("?");
+    terminal_port_put('?');
     text_put_u32(status);
-    text_put(" ");
+    terminal_port_put(' ');
     text_put_flash(status_words(status));
     if (status == STATUS_RANGE) {
-        text_put(" ");
+        terminal_port_put(' ');
         text_put_flash(range);
     }
     text_new_line();
@@ -58,33 +62,26 @@ static void put_times(void)
 }
 
 /* Sends the next part of what is owed, if it fits: the end of the echoed line, displays, times, error and prompt. */
-static bool pay(void)
+static NOINLINE bool pay(void)
 {
-    if (!behind) {
-        return false;
-    }
     const uint8_t room = terminal_port_free();
-    if (owes_new_line) {
-        if (room < 2) {
-            return false;
-        }
-        text_new_line();
-        owes_new_line = false;
-        return true;
-    }
-    if (display_active()) {
+    if (display_active() && !owes_new_line) {
         return display_poll();
     }
+    if (room < (owes_times ? 2 + TIMES_BYTES : ANSWER_BYTES)) {
+        return false;
+    }
+    if (owes_new_line) {
+        text_new_line();
+        owes_new_line = false;
+    }
+    if (display_active()) {
+        return true;
+    }
     if (owes_times) {
-        if (room < TIMES_BYTES) {
-            return false;
-        }
         put_times();
         owes_times = false;
         return true;
-    }
-    if (room < ANSWER_BYTES) {
-        return false;
     }
     if (owed_status != STATUS_OK) {
         put_error(owed_status, owed_range);
@@ -92,27 +89,6 @@ static bool pay(void)
     }
     text_put_flash(prompt);
     behind = false;
-    return true;
-}
-
-/* Brings the screen to what the line is: one character a call. */
-static bool echo(void)
-{
-    if (behind || echoed == line.length) {
-        return false;
-    }
-    if (echoed < line.length) {
-        if (terminal_port_free() == 0) {
-            return false;
-        }
-        terminal_port_put((uint8_t)line.text[echoed++]);
-        return true;
-    }
-    if (terminal_port_free() < 3) {
-        return false;
-    }
-    text_put("\b \b");
-    echoed--;
     return true;
 }
 
@@ -130,7 +106,34 @@ static void owe(status_t status, const char *range)
     echoed = 0;
 }
 
-static void end_line(void)
+/* Brings the screen to what the line is, as far as the port has room. */
+static NOINLINE bool echo(void)
+{
+    bool worked = false;
+    uint8_t room = terminal_port_free();
+    while (echoed < line.length && room > 0) {
+        terminal_port_put((uint8_t)line.text[echoed++]);
+        room--;
+        worked = true;
+    }
+    return worked;
+}
+
+/* A character was taken back: from the screen too, or the line is shown anew when there is room. */
+static NOINLINE void erase(void)
+{
+    if (echoed <= line.length) {
+        return; /* it had not been echoed */
+    }
+    if (terminal_port_free() < 3) {
+        owe(STATUS_OK, 0);
+        return;
+    }
+    text_put_flash(FLASH_TEXT("\b \b"));
+    echoed--;
+}
+
+static NOINLINE void end_line(void)
 {
     const bool timed = commands_debugging();
     if (timed) {
@@ -152,30 +155,16 @@ static void end_line(void)
     owe(status, range);
 }
 
-static void take(uint8_t byte)
+/* The first character of a line: it may act at once, and the clock of the debug mode starts. */
+static NOINLINE bool begin_line(uint8_t byte)
 {
-    const bool blank = line_is_blank(&line);
-    if (byte == TERMINAL_PORT_DAMAGED) {
-        line_damage(&line);
-        return;
+    if (commands_at_once((char)byte)) {
+        return false;
     }
-    if (blank && commands_at_once((char)byte)) {
-        return;
+    if (commands_debugging()) {
+        line_begin_us = timebase_us();
     }
-    switch (line_take(&line, byte)) {
-    case LINE_UNCHANGED: break;
-    case LINE_EDITED:
-        if (blank && commands_debugging()) {
-            line_begin_us = timebase_us();
-        }
-        commands_read_ahead(line.text, line.length);
-        break;
-    case LINE_CLEARED:
-        commands_read_ahead(line.text, 0);
-        owe(STATUS_OK, 0);
-        break;
-    case LINE_ENDED: end_line(); break;
-    }
+    return true;
 }
 
 void terminal_init(void)
@@ -191,14 +180,47 @@ void terminal_init(void)
     text_put_flash(prompt);
 }
 
+/* Takes what has arrived, up to the first byte that ends or changes a line otherwise than by one more character. */
+static line_event_t take(bool *worked)
+{
+    for (uint8_t bytes = BYTES_AT_ONCE; bytes > 0; bytes--) {
+        const int16_t byte = terminal_port_get();
+        if (byte < 0) {
+            break;
+        }
+        *worked = true;
+        if (byte == TERMINAL_PORT_DAMAGED) {
+            line_damage(&line);
+        } else if (!line_is_blank(&line) || begin_line((uint8_t)byte)) {
+            const line_event_t event = line_take(&line, (uint8_t)byte);
+            if (event > LINE_APPENDED) {
+                return event;
+            }
+        }
+    }
+    return LINE_APPENDED;
+}
+
 bool terminal_poll(void)
 {
-    uint8_t byte;
-    bool worked = terminal_port_get(&byte);
-    if (worked) {
-        take(byte);
+    bool worked = false;
+    const line_event_t event = take(&worked);
+    if (event == LINE_ERASED) {
+        erase();
     }
-    worked |= pay();
-    worked |= echo();
+    if (!behind) {
+        worked |= echo();
+    }
+    if (event == LINE_ENDED) {
+        end_line();
+    } else if (worked) {
+        commands_read_ahead(line.text, line.length);
+        if (event == LINE_CLEARED) {
+            owe(STATUS_OK, 0);
+        }
+    }
+    if (behind) {
+        worked |= pay();
+    }
     return worked;
 }

@@ -16,6 +16,6 @@
 
 void terminal_init(void); /* prints the version line and the first prompt; the port is ready */
 
-bool terminal_poll(void); /* takes at most one byte in, sends what is owed; true if it did anything */
+bool terminal_poll(void); /* takes a few bytes in, sends what is owed; true if it did anything */
 
 #endif

@@ -6,14 +6,13 @@
 #ifndef CLI_TERMINAL_PORT_H
 #define CLI_TERMINAL_PORT_H
 
-#include <stdbool.h>
 #include <stdint.h>
 
 #define TERMINAL_PORT_DAMAGED 0xFFu
 
 void terminal_port_init(uint32_t baud); /* 300..2,000,000; the nearest divisor is taken */
 
-bool terminal_port_get(uint8_t *byte); /* false: nothing has arrived */
+int16_t terminal_port_get(void); /* -1: nothing has arrived */
 
 uint8_t terminal_port_free(void);      /* how many bytes terminal_port_put() would take now, 0..63 */
 void terminal_port_put(uint8_t byte);  /* only while terminal_port_free() is not 0 */

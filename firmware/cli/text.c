@@ -3,7 +3,8 @@
 #include "base/number.h"
 #include "cli/terminal_port.h"
 
-void text_put(const char *text)
+/* In RAM. */
+static void put(const char *text)
 {
     while (*text != '\0') {
         terminal_port_put((uint8_t)*text++);
@@ -21,14 +22,14 @@ void text_put_u32(uint32_t value)
 {
     char text[NUMBER_TEXT_BYTES];
     number_format_u32(text, value);
-    text_put(text);
+    put(text);
 }
 
 void text_put_i32(int32_t value)
 {
     char text[NUMBER_TEXT_BYTES];
     number_format_i32(text, value);
-    text_put(text);
+    put(text);
 }
 
 void text_put_accel(accel_code_t code)
@@ -39,7 +40,7 @@ void text_put_accel(accel_code_t code)
     } else {
         number_format_u32(text, code - ACCEL_CODE_WHOLE + 100u);
     }
-    text_put(text);
+    put(text);
 }
 
 void text_new_line(void)

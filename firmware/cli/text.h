@@ -7,7 +7,6 @@
 #include <stdint.h>
 #include "motion/command.h"
 
-void text_put(const char *text);       /* in RAM */
 void text_put_flash(const char *text); /* in flash */
 void text_put_u32(uint32_t value);
 void text_put_i32(int32_t value);

@@ -29,7 +29,11 @@ static status_t read(const char *text)
     for (const char *c = text + 1; *c != '\0'; c++) {
         motion_syntax_take(&syntax, *c);
     }
-    return motion_syntax_end(&syntax, &defaults);
+    const status_t status = motion_syntax_end(&syntax);
+    if (status == STATUS_OK) {
+        motion_syntax_keep(&syntax, &defaults);
+    }
+    return status;
 }
 
 /* Reads a text that must be refused, and that the session defaults are as before. */

@@ -63,13 +63,9 @@ void terminal_port_fake_clear(void)
     sent[0] = '\0';
 }
 
-bool terminal_port_get(uint8_t *byte)
+int16_t terminal_port_get(void)
 {
-    if (taken_count == typed_count) {
-        return false;
-    }
-    *byte = typed[taken_count++];
-    return true;
+    return taken_count == typed_count ? -1 : typed[taken_count++];
 }
 
 uint8_t terminal_port_free(void)
