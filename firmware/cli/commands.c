@@ -1,5 +1,6 @@
 #include "cli/commands.h"
 #include "base/flash.h"
+#include "base/inline.h"
 #include "cli/display.h"
 #include "cli/motion_syntax.h"
 #include "cli/timebase_port.h"
@@ -43,6 +44,7 @@ static status_t command_motion(const char *rest)
         status = queue_add(&ahead.command);
     }
     if (status == STATUS_OK) {
+        queue_poll(); /* at once: everything else can wait */
         motion_syntax_keep(&ahead, &session);
     } else {
         refused_range = ahead.range;
@@ -277,23 +279,36 @@ void commands_read_ahead(const char *line, uint8_t length)
     characters_ahead = length;
 }
 
-status_t commands_execute(const char *line, uint8_t length, const char **range)
+/* Any line but a motion command. */
+static NOINLINE status_t execute_other(const char *line)
 {
-    commands_read_ahead(line, length);
-    status_t status = STATUS_OK;
-    if (characters_ahead != 0) {
-        status = command_motion(line); /* it has been recognized by its first letter; time counts */
-    } else if (line[0] >= '0' && line[0] <= '9') {
-        status = STATUS_NOT_YET; /* a network address: TRM-006 */
-    } else if (!is_end(line[0])) {
-        if (line[0] == '$') {
-            queue_stop();
-        }
-        status = dispatch(line);
+    if (line[0] >= '0' && line[0] <= '9') {
+        return STATUS_NOT_YET; /* a network address: TRM-006 */
+    }
+    if (is_end(line[0])) {
+        return STATUS_OK;
+    }
+    if (line[0] == '$') {
+        queue_stop();
+    }
+    return dispatch(line);
+}
+
+status_t commands_execute(const char *line, uint8_t length)
+{
+    if (characters_ahead != length) {
+        commands_read_ahead(line, length);
+    }
+    if (characters_ahead == 0) {
+        return execute_other(line);
     }
     characters_ahead = 0;
-    *range = refused_range;
-    return status;
+    return command_motion(line); /* not by the table: it is known by its first letter, and time counts */
+}
+
+const char *commands_refused_range(void)
+{
+    return refused_range;
 }
 
 bool commands_at_once(char character)

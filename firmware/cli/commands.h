@@ -3,7 +3,7 @@
  * A space ends a command; what follows is ignored. Every line that begins with $ ends all activity first, as S, even if
  * it is then refused (manual line 839).
  * Context: main loop.
- * Errors:  a status of base/status.def; then nothing has changed. With STATUS_RANGE, *range is the range, in flash.
+ * Errors:  a status of base/status.def; then nothing has changed.
  * Tests:   test/host/test_commands.c */
 #ifndef CLI_COMMANDS_H
 #define CLI_COMMANDS_H
@@ -19,7 +19,10 @@ void commands_init(void);
 void commands_read_ahead(const char *line, uint8_t length);
 
 /* Executes a line; a blank one, or one that begins with a space, does nothing. */
-status_t commands_execute(const char *line, uint8_t length, const char **range);
+status_t commands_execute(const char *line, uint8_t length);
+
+/* The range that the last STATUS_RANGE referred to, in flash. */
+const char *commands_refused_range(void);
 
 /* + and -: whether this character, first on a line, is a command of its own. Executes it if so. */
 bool commands_at_once(char character);

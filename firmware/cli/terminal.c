@@ -7,7 +7,6 @@
 #include "cli/terminal_port.h"
 #include "cli/text.h"
 #include "cli/timebase_port.h"
-#include "queue/queue.h"
 #include "version.h"
 
 /* The longest answer: CR LF, an error with its range, CR LF, the prompt. */
@@ -30,8 +29,7 @@ static const char *owed_range;  /* of that error */
 
 /* Debug mode: how long the last line took. */
 static bool owes_times;
-static uint32_t line_begin_us;
-static uint32_t received_us;
+static uint32_t received_us; /* while a line is typed: when it began */
 static uint32_t loaded_us;
 
 static const char received_text[] FLASH = "received ";
@@ -39,7 +37,7 @@ static const char loaded_text[] FLASH = " us, loaded ";
 static const char times_end[] FLASH = " us\r\n";
 enum { TIMES_BYTES = 9 + 10 + 12 + 10 + 5 };
 
-static void put_error(status_t status, const char *range)
+static void put_error(status_t status)
 {
     terminal_port_put('?');
     text_put_u32(status);
@@ -47,7 +45,7 @@ static void put_error(status_t status, const char *range)
     text_put_flash(status_words(status));
     if (status == STATUS_RANGE) {
         terminal_port_put(' ');
-        text_put_flash(range);
+        text_put_flash(owed_range);
     }
     text_new_line();
 }
@@ -84,7 +82,7 @@ static NOINLINE bool pay(void)
         return true;
     }
     if (owed_status != STATUS_OK) {
-        put_error(owed_status, owed_range);
+        put_error(owed_status);
         owed_status = STATUS_OK;
     }
     text_put_flash(prompt);
@@ -93,7 +91,7 @@ static NOINLINE bool pay(void)
 }
 
 /* The answer to a line. */
-static void owe(status_t status, const char *range)
+static void owe(status_t status)
 {
     if (!behind) {
         behind = true;
@@ -101,7 +99,7 @@ static void owe(status_t status, const char *range)
     }
     if (owed_status == STATUS_OK) {
         owed_status = status;
-        owed_range = range;
+        owed_range = commands_refused_range();
     }
     echoed = 0;
 }
@@ -126,33 +124,42 @@ static NOINLINE void erase(void)
         return; /* it had not been echoed */
     }
     if (terminal_port_free() < 3) {
-        owe(STATUS_OK, 0);
+        owe(STATUS_OK);
         return;
     }
     text_put_flash(FLASH_TEXT("\b \b"));
     echoed--;
 }
 
+/* Debug mode: the line has been received, or executed. */
+static NOINLINE void note_received(void)
+{
+    loaded_us = timebase_us();
+    received_us = loaded_us - received_us;
+}
+
+static NOINLINE void note_loaded(void)
+{
+    loaded_us = timebase_us() - loaded_us;
+    owes_times = true;
+}
+
 static NOINLINE void end_line(void)
 {
-    const bool timed = commands_debugging();
+    const bool timed = commands_debugging() && !owes_times && !line_is_blank(&line);
     if (timed) {
-        loaded_us = timebase_us();
-        received_us = loaded_us - line_begin_us;
+        note_received();
     }
-    const char *range = 0;
     status_t status = line.status;
     if (status == STATUS_OK) {
-        status = commands_execute(line.text, line.length, &range);
-        queue_poll(); /* the motion first, then the answer */
+        status = commands_execute(line.text, line.length); /* the motion first, then the answer */
     }
-    if (timed && commands_debugging() && !line_is_blank(&line)) {
-        loaded_us = timebase_us() - loaded_us;
-        owes_times = true;
+    if (timed && commands_debugging()) {
+        note_loaded();
     }
     line_reset(&line);
     commands_read_ahead(line.text, 0);
-    owe(status, range);
+    owe(status);
 }
 
 /* The first character of a line: it may act at once, and the clock of the debug mode starts. */
@@ -161,8 +168,8 @@ static NOINLINE bool begin_line(uint8_t byte)
     if (commands_at_once((char)byte)) {
         return false;
     }
-    if (commands_debugging()) {
-        line_begin_us = timebase_us();
+    if (commands_debugging() && !owes_times) {
+        received_us = timebase_us();
     }
     return true;
 }
@@ -216,7 +223,7 @@ bool terminal_poll(void)
     } else if (worked) {
         commands_read_ahead(line.text, line.length);
         if (event == LINE_CLEARED) {
-            owe(STATUS_OK, 0);
+            owe(STATUS_OK);
         }
     }
     if (behind) {

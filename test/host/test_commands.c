@@ -9,8 +9,6 @@
 #include "queue/session.h"
 #include "unity.h"
 
-static const char *range;
-
 void setUp(void)
 {
     terminal_port_fake_reset();
@@ -27,7 +25,7 @@ void tearDown(void)
 
 static status_t execute(const char *text)
 {
-    return commands_execute(text, (uint8_t)strlen(text), &range);
+    return commands_execute(text, (uint8_t)strlen(text));
 }
 
 static void finish_displays(void)
@@ -69,11 +67,20 @@ static void refuse(status_t expected, const char *text)
 /* MOT-005, MOT-006 */
 static void test_a_motion_command_is_stored_and_pending(void)
 {
+    engine_fake.accepts = false;
     TEST_ASSERT_EQUAL(STATUS_OK, execute("m200v50"));
     TEST_ASSERT_EQUAL_UINT8(1, queue_pending());
     TEST_ASSERT_EQUAL_UINT32(200, queue_entry(1)->count);
     TEST_ASSERT_EQUAL_UINT32(50, queue_entry(1)->velocity);
     TEST_ASSERT_EQUAL_UINT32(50, session.velocity);
+}
+
+/* MOT-006 */
+static void test_a_motion_command_is_handed_to_an_idle_engine_at_once(void)
+{
+    TEST_ASSERT_EQUAL(STATUS_OK, execute("m200"));
+    TEST_ASSERT_EQUAL_UINT(1, engine_fake.submitted_count);
+    TEST_ASSERT_EQUAL_UINT8(0, queue_pending());
 }
 
 static void test_a_line_read_ahead_is_the_same_as_one_read_at_its_end(void)
@@ -235,6 +242,7 @@ static void test_dollar_f_p_and_u_select_steps_or_pulses(void)
 static void test_a_system_command_ends_all_activity_even_if_it_is_refused(void)
 {
     static const char *const lines[] = {"$L1", "$L", "$L2", "$F", "$R", "$?", "$"};
+    engine_fake.accepts = false;
     for (unsigned i = 0; i < sizeof lines / sizeof lines[0]; i++) {
         execute("m100");
         execute(lines[i]);
@@ -272,7 +280,7 @@ static void test_each_wrong_line_is_refused_and_changes_nothing(void)
     refuse(STATUS_VELOCITY_ZERO, "v0");
     refuse(STATUS_NOT_YET, "m");
     refuse(STATUS_RANGE, "m5u256");
-    TEST_ASSERT_EQUAL_STRING("0..255", range);
+    TEST_ASSERT_EQUAL_STRING("0..255", commands_refused_range());
 }
 
 /* `$` stops first, as it must; nothing else changes. */
@@ -280,7 +288,7 @@ static void test_a_wrong_ramp_number_is_refused_with_the_range(void)
 {
     const session_t before = session;
     TEST_ASSERT_EQUAL(STATUS_RANGE, execute("$L2"));
-    TEST_ASSERT_EQUAL_STRING("0..1", range);
+    TEST_ASSERT_EQUAL_STRING("0..1", commands_refused_range());
     TEST_ASSERT_EQUAL(STATUS_RANGE, execute("$L10"));
     TEST_ASSERT_EQUAL(STATUS_SYNTAX, execute("$Lx"));
     TEST_ASSERT_EQUAL_MEMORY(&before, &session, sizeof before);
@@ -328,6 +336,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_a_motion_command_is_stored_and_pending);
+    RUN_TEST(test_a_motion_command_is_handed_to_an_idle_engine_at_once);
     RUN_TEST(test_a_line_read_ahead_is_the_same_as_one_read_at_its_end);
     RUN_TEST(test_characters_taken_back_are_forgotten_by_the_reading_ahead);
     RUN_TEST(test_a_full_queue_refuses_the_command_and_its_session_values);

@@ -24,8 +24,7 @@ void tearDown(void)
 
 static void execute(const char *text)
 {
-    const char *range;
-    TEST_ASSERT_EQUAL_MESSAGE(STATUS_OK, commands_execute(text, (uint8_t)strlen(text), &range), text);
+    TEST_ASSERT_EQUAL_MESSAGE(STATUS_OK, commands_execute(text, (uint8_t)strlen(text)), text);
 }
 
 /* What the command prints. */

@@ -230,6 +230,11 @@ static void test_a_line_typed_during_a_display_is_executed_at_once_and_answered_
     TEST_ASSERT_EQUAL_UINT32(1234, engine_fake.submitted[0].count);
 }
 
+static void test_the_range_told_after_a_display_is_that_of_the_first_error(void)
+{
+    TEST_ASSERT_NOT_NULL(strstr(answer("q\rm5u300\ra1000\r"), "s sync\r\n?12 range 0..255\r\nSAC>"));
+}
+
 /* CLK-013 */
 static void test_a_flood_faster_than_the_answers_is_executed_to_the_last_line(void)
 {
@@ -316,6 +321,7 @@ int main(void)
     RUN_TEST(test_displays_that_were_asked_for_at_once_are_all_printed_before_the_prompt);
     RUN_TEST(test_one_display_too_many_is_refused);
     RUN_TEST(test_a_line_typed_during_a_display_is_executed_at_once_and_answered_after_it);
+    RUN_TEST(test_the_range_told_after_a_display_is_that_of_the_first_error);
     RUN_TEST(test_a_flood_faster_than_the_answers_is_executed_to_the_last_line);
     RUN_TEST(test_echo_of_a_flood_is_thinned_out_by_whole_lines);
     RUN_TEST(test_debug_reports_how_long_each_line_took);
