@@ -50,8 +50,7 @@ board_t *board_new(const char *elf_path, const uint8_t *eeprom)
     b->next_event = NEVER;
     if (!image_load(b, elf_path)) {
         image_free(b);
-        avr_terminate(b->avr);
-        free(b->avr);
+        simavr_stop(b);
         free(b);
         return NULL;
     }
@@ -72,8 +71,7 @@ void board_free(board_t *b)
     BOARD_MODELS(MODEL_FREE)
 #undef MODEL_FREE
     image_free(b);
-    avr_terminate(b->avr);
-    free(b->avr);
+    simavr_stop(b);
     free(b);
 }
 

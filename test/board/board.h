@@ -126,7 +126,7 @@ typedef struct {
 } board_isr_t;
 typedef struct {
     board_isr_t isr[BOARD_VECTORS];
-    uint32_t masked_max;       /* longest time with I = 0 outside interrupts, cycles */
+    uint32_t masked_max;       /* longest time with I = 0 outside interrupts, cycles; start-up before SEI left out */
     uint16_t masked_max_pc;    /* byte address at which it ended */
     uint32_t isr_masked_max;   /* longest time with I = 0 inside an interrupt, entry included */
     uint8_t isr_masked_vector; /* and in which */

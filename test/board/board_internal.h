@@ -250,6 +250,7 @@ void extint_pins_changed(board_t *b, int port, uint8_t levels, uint8_t changed, 
 uint8_t extint_watched(const board_t *b, int port); /* pins whose edges the interrupt logic looks at */
 uint64_t board_time(const board_t *b);              /* stamp of the event being run, or the CPU's cycle */
 
+void simavr_stop(board_t *b);
 bool simavr_start(board_t *b); /* simavr_glue.c: makes b->avr; false: simavr does not know the ATmega328P */
 bool irq_dispatch(board_t *b); /* enters the most urgent vector, if any is allowed */
 

@@ -124,13 +124,13 @@ static void update(board_t *b, int port, uint64_t cycle)
         p->level_before = p->level;
     p->changed_at = cycle;
     p->level = now;
+    extint_pins_changed(b, port, now, changed, cycle); /* first: a callback may drive pins in its turn */
     seen = changed & (p->recorded | p->wired | p->listened);
     while (seen) {
         int bit = __builtin_ctz(seen);
         seen &= (uint8_t)(seen - 1);
         edge_seen(b, (board_pin_t)(port * 8 + bit), now >> bit & 1, cycle);
     }
-    extint_pins_changed(b, port, now, changed, cycle);
 }
 
 /* -- registers ------------------------------------------------------------------------------------------------------ */

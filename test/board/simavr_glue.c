@@ -19,6 +19,7 @@
 #include <simavr/avr_watchdog.h>
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define MCU "atmega328p"
@@ -83,4 +84,16 @@ bool simavr_start(board_t *b)
     b->instructions.ioctl = instruction_request;
     avr_register_io(b->avr, &b->instructions);
     return true;
+}
+
+/* simavr's own farewell forgets the names of its interrupt lines and the list that they stand in. */
+void simavr_stop(board_t *b)
+{
+    avr_t *avr = b->avr;
+    avr_terminate(avr);
+    for (int i = 0; i < AVR_INT_IRQ_COUNT; i++)
+        free((char *)avr->interrupts.irq[i].name);
+    free(avr->irq_pool.irq);
+    free(avr);
+    b->avr = NULL;
 }

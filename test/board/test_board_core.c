@@ -437,7 +437,7 @@ static void test_a_nested_interrupt_counts_for_itself_only(void)
 static void assert_crash(uint8_t way, const char *says)
 {
     start(PROGRAM("crash"));
-    run(100);
+    run(5000); /* .bss is cleared */
     set("way", 0, way);
     TEST_ASSERT_EQUAL(BOARD_CRASHED, board_run_for(board, 100000));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(board_crash(board), says), board_crash(board));
@@ -466,6 +466,20 @@ static void test_a_stack_that_meets_bss_is_a_crash(void)
 static void test_a_pop_above_ram_is_a_crash(void)
 {
     assert_crash(4, "outside memory");
+}
+
+static void test_a_stack_pointer_above_ram_is_a_crash(void)
+{
+    assert_crash(5, "above RAM");
+}
+
+static void test_a_stack_pointer_written_by_halves_counts_when_it_is_whole(void)
+{
+    start(PROGRAM("crash"));
+    run(5000); /* .bss is cleared */
+    set("way", 0, 6);
+    run(100);
+    TEST_ASSERT_EQUAL_HEX16(0x07F0, board_measures(board)->stack_low);
 }
 
 /* -- loading and running --------------------------------------------------------------------------------------------------------- */
@@ -560,6 +574,8 @@ int main(void)
     RUN_TEST(test_a_jump_out_of_the_program_is_a_crash);
     RUN_TEST(test_a_stack_that_meets_bss_is_a_crash);
     RUN_TEST(test_a_pop_above_ram_is_a_crash);
+    RUN_TEST(test_a_stack_pointer_above_ram_is_a_crash);
+    RUN_TEST(test_a_stack_pointer_written_by_halves_counts_when_it_is_whole);
     RUN_TEST(test_an_image_with_a_nobits_section_before_data_is_loaded);
     RUN_TEST(test_a_missing_image_and_a_missing_symbol_are_refused);
     RUN_TEST(test_memory_is_poked_and_peeked_in_three_widths);

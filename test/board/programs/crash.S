@@ -19,6 +19,10 @@ main:
     breq pushes
     cpi r24, 4
     breq pops
+    cpi r24, 5
+    breq above
+    cpi r24, 6
+    breq halves
     rjmp main
 illegal:
     .word 0x9404
@@ -32,3 +36,17 @@ pushes:
 pops:
     pop r0
     rjmp pops
+
+    .macro stack address ; as avr-gcc writes it, the high byte first
+    ldi r16, hi8(\address)
+    out _SFR_IO_ADDR(SPH), r16
+    ldi r16, lo8(\address)
+    out _SFR_IO_ADDR(SPL), r16
+    .endm
+above:
+    stack 0x0A00
+1:  rjmp 1b
+halves:
+    stack 0x0801
+    stack 0x07F0 ; by way of 0x0701
+1:  rjmp 1b
