@@ -39,5 +39,5 @@ export const cases = [
     { name: 'next with prejudice', typed: [[0, 'm2000v150a5d5\r'], [20, 'm50\r'], [501, 'N\r']], pulses: [ANY], ms: 1200 },
     { image: 'fine', name: '8 microsteps, cruise 2 us', typed: [[0, 'm10000vc16a999d999\r']], pulses: [80000], ms: 250 },
     { image: 'fine', name: '8 microsteps, harmonic', typed: [[0, 'm300v200a2d3\r']], pulses: [2400], ms: 1500 },
-    { image: 'fine', name: '8 microsteps, linear', typed: [[0, 'm-200l1v300a200d100\r']], pulses: [1600], ms: 800 },
+    { image: 'fine', name: '8 microsteps, linear', typed: [[0, 'm-800l1v300a50d40\r']], pulses: [6400], ms: 1700 },
 ];
