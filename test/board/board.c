@@ -106,11 +106,18 @@ static uint16_t opcode_at(const avr_t *avr, uint32_t pc)
 }
 
 /* The stack pointer left the range seen so far. While OUT SPH and OUT SPL move it in two steps it may point anywhere:
- * only the second counts (avr-gcc writes SPH first). */
+ * only the second counts. avr-gcc writes SPH first, restores SREG between the two and never takes longer. */
+#define HALF_WRITTEN_CYCLES 3
+#define IS_OUT_SPH(opcode) (((opcode)&0xFE0F) == 0xBE0E)
+#define IS_OUT_SPL(opcode) (((opcode)&0xFE0F) == 0xBE0D)
+
 static void stack_moved(board_t *b, uint16_t sp, uint32_t pc)
 {
-    bool half_written = (opcode_at(b->avr, pc) & 0xFE0F) == 0xBE0E; /* OUT SPH, Rr */
-    if (half_written)
+    uint16_t opcode = opcode_at(b->avr, pc);
+
+    if (IS_OUT_SPH(opcode))
+        b->stack_whole_at = b->avr->cycle + HALF_WRITTEN_CYCLES;
+    if (b->avr->cycle < b->stack_whole_at && !IS_OUT_SPL(opcode))
         return;
     if (sp > BOARD_RAMEND)
         board_crashed(b, "stack pointer 0x%04x above RAM at 0x%04x", sp, (unsigned)pc);

@@ -211,8 +211,9 @@ struct board {
     bool i_seen; /* SREG's I after the last instruction */
 
     /* image */
-    uint32_t code_end;    /* first flash byte after the image */
-    uint16_t stack_limit; /* first RAM byte after .bss and .noinit */
+    uint32_t code_end;       /* first flash byte after the image */
+    uint64_t stack_whole_at; /* until then the stack pointer may be half written */
+    uint16_t stack_limit;    /* first RAM byte after .bss and .noinit */
     board_symbol_t *symbols;
     size_t symbol_count;
     uint8_t *image_eeprom; /* the .eeprom section, BOARD_EEPROM_BYTES; NULL: none */
