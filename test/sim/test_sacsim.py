@@ -610,9 +610,9 @@ class AtTheTerminal(unittest.TestCase):
 class SerialPort(unittest.TestCase):
     """The board's terminal on a pseudo terminal."""
 
-    def start(self, *arguments):
+    def start(self, *arguments, image=None):
         child = subprocess.Popen(
-            [SACSIM, "--pty", *arguments, probe],
+            [SACSIM, "--pty", *arguments, image or probe],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -689,6 +689,15 @@ class SerialPort(unittest.TestCase):
         port.expect(rb"hello 2\r\nSAC>")
         os.close(port.descriptor)
 
+    @unittest.skipUnless(os.path.exists(FIRMWARE), f"{FIRMWARE} is not built")
+    def test_firmware_behind_a_port(self):
+        _, path = self.start(image=FIRMWARE)
+        port = self.open(path)
+        port.expect(rb"SAC>")
+        port.send(b"m20v300\r")
+        port.expect(rb"m20v300\r\n.*SAC>")
+        os.close(port.descriptor)
+
     def test_at_a_terminal_ctrl_c_ends_it(self):
         with Terminal("--pty") as t:
             t.expect(rb"serial port /dev/.*Ctrl-C quits")
@@ -719,6 +728,21 @@ class Firmware(unittest.TestCase):
             t.expect_status(rb"STANDBY pos 200 +0\.0 steps/s")
             t.send(b"m-300\r")
             t.expect_status(rb"STANDBY pos -100 ")
+
+    def test_uart_in_the_vcd_is_read_by_sigrok(self):
+        if not shutil.which("sigrok-cli"):
+            self.skipTest("sigrok-cli is not installed")
+        path = path_of("uart.vcd")
+        run("--vcd", path, "--pins", "hw_tx", image=FIRMWARE, given=b"?\r")
+        done = subprocess.run(
+            ["sigrok-cli", "-I", "vcd:downsample=625", "-i", path]
+            + ["-P", "uart:rx=hw_tx:baudrate=38400:format=ascii", "-A", "uart=rx-data"],
+            capture_output=True,
+            check=True,
+            timeout=60,
+            text=True,
+        )
+        self.assertIn("SAC>?", done.stdout.replace("uart-1: ", "").replace("\n", ""))
 
     def test_reset_button_brings_the_prompt_again(self):
         with Terminal(image=FIRMWARE) as t:
