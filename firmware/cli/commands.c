@@ -11,12 +11,14 @@
 typedef enum { CASE_ANY, CASE_EXACT } case_rule_t;
 typedef enum { ARGUMENT_NONE, ARGUMENT_REST } argument_t;
 
+typedef status_t (*handler_t)(const char *rest);
+
 typedef struct {
     char first;
     char second; /* 0: one letter is enough */
     uint8_t case_rule;
     uint8_t argument;
-    status_t (*handler)(const char *rest);
+    handler_t handler;
     const char *form;
     const char *help;
 } command_row_t;
@@ -24,7 +26,7 @@ typedef struct {
 static bool debugging;
 static const char *refused_range; /* for STATUS_RANGE */
 
-/* The motion command being read ahead: how many characters of the line it has seen, 0 for none. */
+/* The motion command, or single value, being read ahead: how many characters of the line it has seen, 0 for none. */
 static motion_syntax_t ahead;
 static uint8_t characters_ahead;
 
@@ -36,30 +38,15 @@ static bool is_end(char c)
 
 /* -- handlers: rest is what follows the command's letters, up to the space or the end of the line --------------------- */
 
-static status_t command_motion(const char *rest)
+/* m, and v, vc, a, d alone: all of the line has been read ahead. */
+static status_t command_read_ahead(const char *rest)
 {
-    (void)rest; /* read ahead */
+    (void)rest;
     status_t status = motion_syntax_end(&ahead);
-    if (status == STATUS_OK) {
+    if (status == STATUS_OK && !ahead.single) {
         status = queue_add(&ahead.command);
-    }
-    if (status == STATUS_OK) {
         queue_poll(); /* at once: everything else can wait */
-        motion_syntax_keep(&ahead, &session);
-    } else {
-        refused_range = ahead.range;
     }
-    return status;
-}
-
-/* v, vc, a, d alone: the same rules as within a motion command. rest[-1] is the command's letter. */
-static status_t command_session_value(const char *rest)
-{
-    motion_syntax_begin(&ahead, rest[-1], &session);
-    for (; *rest != '\0'; rest++) {
-        motion_syntax_take(&ahead, *rest);
-    }
-    const status_t status = motion_syntax_end(&ahead);
     if (status == STATUS_OK) {
         motion_syntax_keep(&ahead, &session);
     } else {
@@ -227,30 +214,33 @@ static char lower(char c)
 static status_t dispatch(const char *line)
 {
     const char first = line[0];
-    const char second = line[1];
     const char first_lower = lower(first);
     bool letter_known = false;
 
-    for (uint8_t i = 0; i < ROWS; i++) {
-        const char row_first = (char)flash_u8(&rows[i].first);
+    for (const command_row_t *row = rows; row < rows + ROWS; row++) {
+        const char row_first = (char)flash_u8(&row->first);
         if (row_first != first && row_first != first_lower) {
             continue; /* most rows: nothing more is read of them */
         }
-        command_row_t row;
-        FLASH_COPY(&row, &rows[i], sizeof row);
-        const bool exact = row.case_rule == CASE_EXACT;
-        if (exact && row.first != first) {
+        const bool exact = flash_u8(&row->case_rule) == CASE_EXACT;
+        if (exact && row_first != first) {
             continue;
         }
-        if (row.second != '\0' && row.second != (exact ? second : lower(second))) {
-            continue;
+        const char *rest = line + 1;
+        const char row_second = (char)flash_u8(&row->second);
+        if (row_second != '\0') {
+            if (row_second != (exact ? *rest : lower(*rest))) {
+                continue;
+            }
+            rest++;
         }
         letter_known = true;
-        const char *rest = line + (row.second != '\0' ? 2 : 1);
-        if (row.argument == ARGUMENT_NONE && !is_end(*rest)) {
+        if (flash_u8(&row->argument) == ARGUMENT_NONE && !is_end(*rest)) {
             continue;
         }
-        return row.handler(rest);
+        handler_t handler;
+        FLASH_COPY(&handler, &row->handler, sizeof handler);
+        return handler(rest);
     }
     return letter_known ? STATUS_SYNTAX : STATUS_UNKNOWN_COMMAND;
 }
@@ -262,14 +252,21 @@ void commands_init(void)
     characters_ahead = 0;
 }
 
+/* The commands that are read by the rules of motion_syntax.h. */
+static bool is_read_ahead(char first)
+{
+    const char letter = lower(first);
+    return letter == 'm' || letter == 'v' || letter == 'a' || letter == 'd';
+}
+
 void commands_read_ahead(const char *line, uint8_t length)
 {
-    if (length == 0 || lower(line[0]) != 'm') {
-        characters_ahead = 0;
-        return;
-    }
     uint8_t i = characters_ahead;
     if (i == 0 || i > length) {
+        characters_ahead = 0;
+        if (length == 0 || !is_read_ahead(line[0])) {
+            return;
+        }
         motion_syntax_begin(&ahead, line[0], &session);
         i = 1;
     }
@@ -279,8 +276,8 @@ void commands_read_ahead(const char *line, uint8_t length)
     characters_ahead = length;
 }
 
-/* Any line but a motion command. */
-static NOINLINE status_t execute_other(const char *line)
+/* By the table. */
+static NOINLINE status_t execute_by_table(const char *line)
 {
     if (line[0] >= '0' && line[0] <= '9') {
         return STATUS_NOT_YET; /* a network address: TRM-006 */
@@ -296,14 +293,11 @@ static NOINLINE status_t execute_other(const char *line)
 
 status_t commands_execute(const char *line, uint8_t length)
 {
-    if (characters_ahead != length) {
-        commands_read_ahead(line, length);
-    }
-    if (characters_ahead == 0) {
-        return execute_other(line);
-    }
+    commands_read_ahead(line, length);
+    const bool complete = characters_ahead != 0 && ahead.status == STATUS_OK;
     characters_ahead = 0;
-    return command_motion(line); /* not by the table: it is known by its first letter, and time counts */
+    /* What was read ahead without an error needs no search: time counts. (vd is an error there.) */
+    return complete ? command_read_ahead(line) : execute_by_table(line);
 }
 
 const char *commands_refused_range(void)

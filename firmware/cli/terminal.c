@@ -13,7 +13,10 @@
 enum { ANSWER_BYTES = 36 };
 
 /* At a high rate several bytes are taken in one round of the main loop, but never more than one line. */
-enum { BYTES_AT_ONCE = 4 };
+enum { BYTES_AT_ONCE = 8 };
+
+/* With more than these waiting to be taken, the output rests. */
+enum { PRESSED_BYTES = 16 };
 
 static const char version_line[] FLASH = "SAC " VERSION_NUMBER " " VERSION_DATE "\r\n";
 static const char prompt[] FLASH = "SAC>";
@@ -212,10 +215,12 @@ bool terminal_poll(void)
 {
     bool worked = false;
     const line_event_t event = take(&worked);
+    const bool pressed = terminal_port_waiting() > PRESSED_BYTES;
     if (event == LINE_ERASED) {
         erase();
     }
-    if (!behind) {
+    /* A line is echoed whole or not at all. */
+    if (!behind && echoed != line.length && (!pressed || echoed != 0)) {
         worked |= echo();
     }
     if (event == LINE_ENDED) {
@@ -226,7 +231,7 @@ bool terminal_poll(void)
             owe(STATUS_OK);
         }
     }
-    if (behind) {
+    if (behind && !pressed) {
         worked |= pay();
     }
     return worked;

@@ -32,6 +32,11 @@ int16_t terminal_port_get(void)
     return byte;
 }
 
+uint8_t terminal_port_waiting(void)
+{
+    return (uint8_t)((usart_rx_head - usart_rx_tail) & (USART_RX_BYTES - 1));
+}
+
 uint8_t terminal_port_free(void)
 {
     return (uint8_t)((usart_tx_tail - usart_tx_head - 1) & (USART_TX_BYTES - 1));

@@ -11,11 +11,13 @@ static char sent[200000];
 static size_t sent_count;
 static size_t unsent; /* of these, how many still stand in the ring */
 static int holding;
+static int arriving_slowly;
 
 void terminal_port_fake_reset(void)
 {
     typed_count = taken_count = sent_count = unsent = 0;
     holding = 0;
+    arriving_slowly = 1;
     sent[0] = '\0';
 }
 
@@ -42,6 +44,11 @@ void terminal_port_fake_hold(int hold)
     holding = hold;
 }
 
+void terminal_port_fake_press(int press)
+{
+    arriving_slowly = !press;
+}
+
 void terminal_port_fake_drain(size_t bytes)
 {
     unsent = bytes < unsent ? unsent - bytes : 0;
@@ -66,6 +73,11 @@ void terminal_port_fake_clear(void)
 int16_t terminal_port_get(void)
 {
     return taken_count == typed_count ? -1 : typed[taken_count++];
+}
+
+uint8_t terminal_port_waiting(void)
+{
+    return arriving_slowly ? 0 : typed_count - taken_count > 127 ? 127 : (uint8_t)(typed_count - taken_count);
 }
 
 uint8_t terminal_port_free(void)
