@@ -18,7 +18,7 @@ enum {
     CMD_CBI_TIFR1
 };
 
-#define COMMAND_CYCLES 1000 /* longer than any command takes to be taken up */
+#define COMMAND_CYCLES 100000 /* longer than any command takes to be taken up, also under a storm of interrupts */
 
 static inline void start_remote(void)
 {

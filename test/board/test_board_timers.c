@@ -846,7 +846,21 @@ static void test_a_timer_nobody_watches_ends_up_like_a_watched_one(void)
     TEST_ASSERT_EQUAL(flags[1], flags[0]);
 }
 
-/* Two boards get the same random writes; on one the pins are recorded, so that each edge is made in its time. */
+/* Two boards get the same random writes; on one the pins are recorded, so that each edge must be made in its time.
+ * Interrupts must come in the same cycles on both, or their programs fall apart. */
+typedef struct {
+    board_t *board;
+    uint32_t edges, late;
+} punctual_t;
+
+static void see_whether_in_time(void *ctx, board_edge_t edge)
+{
+    punctual_t *seen = ctx;
+    seen->edges++;
+    if (edge.cycle != board_cycle(seen->board))
+        seen->late++;
+}
+
 static uint32_t random_below(uint32_t *state, uint32_t limit)
 {
     *state = *state * 1664525u + 1013904223u;
@@ -864,6 +878,7 @@ static void random_write(uint32_t choice, uint32_t n)
     case 5: write16(TCNT1, (uint16_t)(n % 400)); break;
     case 6: write(TIFR1, (uint8_t)n); break;
     case 7: write(TCCR1C, (uint8_t)n); break;
+    case 8: write(TIMSK1, n & (TOV | OCFA | OCFB | ICF)); break;
     }
 }
 
@@ -871,6 +886,7 @@ static void test_random_writes_leave_a_watched_and_an_unwatched_timer_alike(void
 {
     uint32_t state = 1;
     board_t *both[2];
+    punctual_t seen_edges = {NULL, 0, 0};
     board_free(board);
     for (int i = 0; i < 2; i++) {
         start_remote();
@@ -878,9 +894,12 @@ static void test_random_writes_leave_a_watched_and_an_unwatched_timer_alike(void
         write(DDRB, 0x06);
         board_record(board, OC1A, i);
         board_record(board, OC1B, i);
+        allow_interrupts();
     }
+    seen_edges.board = board;
+    board_on_edge(board, see_whether_in_time, &seen_edges);
     for (int round = 0; round < 3000; round++) {
-        uint32_t choice = random_below(&state, 8);
+        uint32_t choice = random_below(&state, 9);
         uint32_t n = random_below(&state, 0x10000);
         uint32_t wait = random_below(&state, round % 50 ? 2000 : 200000);
         uint16_t seen[2];
@@ -899,6 +918,8 @@ static void test_random_writes_leave_a_watched_and_an_unwatched_timer_alike(void
         TEST_ASSERT_EQUAL_HEX16(seen[1], seen[0]);
         TEST_ASSERT_EQUAL_UINT64(board_cycle(both[1]), board_cycle(both[0]));
     }
+    TEST_ASSERT_GREATER_THAN(5000, seen_edges.edges);
+    TEST_ASSERT_EQUAL(0, seen_edges.late);
     board_free(both[0]);
 }
 

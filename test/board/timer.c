@@ -141,6 +141,15 @@ static uint32_t least(uint32_t a, uint32_t b)
     return a < b ? a : b;
 }
 
+/* Ticks before the one that ends the way up: at TOP, or at MAX when TOP has been passed (a double-slope counter above
+ * TOP turns at once). */
+static uint32_t ticks_to_end(const counter_t *t)
+{
+    if (t->count <= t->top)
+        return (uint32_t)(t->top - t->count);
+    return t->wave >= WAVE_PHASE ? 0 : (uint32_t)(t->max - t->count);
+}
+
 /* Ticks from now on that do nothing but count. A match whose flag is set already and whose pin is not connected does
  * nothing either. */
 static uint32_t quiet_ticks(const counter_t *t)
@@ -158,9 +167,7 @@ static uint32_t quiet_ticks(const counter_t *t)
                 quiet = least(quiet, v - t->compare[i].ocr);
         return quiet;
     }
-    quiet = (v <= t->top ? t->top : t->max) - v;
-    if (t->wave >= WAVE_PHASE && v > t->top)
-        quiet = 0;
+    quiet = ticks_to_end(t);
     if (t->wave == WAVE_FAST && !(flags & FLAG_TOV) && v < t->top && quiet > 0)
         quiet--; /* the tick that reaches TOP */
     for (int i = 0; i < 2; i++) {
@@ -237,7 +244,6 @@ void timer_plan(counter_t *t)
     const uint8_t wanted = REG(b, t->reg_timsk) & (uint8_t)~REG(b, t->reg_tifr);
     const uint32_t v = t->count;
     bool any = (wanted & (FLAG_TOV | FLAG_OCA | FLAG_OCB | FLAG_ICF)) != 0;
-    bool ends_matter = false;
     uint32_t ticks = UINT32_MAX; /* before the one that matters */
 
     if (t->source != CLOCK_INTERNAL || t->prescaler->held) {
@@ -249,8 +255,6 @@ void timer_plan(counter_t *t)
         bool edge = c->connected && pin_watched(b, c->pin);
         if (edge)
             any = true;
-        if (edge && c->at_bottom != PIN_KEEPS)
-            ends_matter = true;
         if (!edge && !(wanted & (FLAG_OCA << i)))
             continue;
         if (t->down ? c->ocr <= v : c->ocr >= v)
@@ -263,11 +267,11 @@ void timer_plan(counter_t *t)
     if (t->down) {
         ticks = least(ticks, v > 0 ? v - 1 : 0);
     } else {
-        uint32_t end = v <= t->top ? t->top : t->max;
-        if ((wanted & FLAG_TOV) && t->wave == WAVE_FAST && v < end)
-            ticks = least(ticks, end - v - 1);
-        if (ends_matter || (wanted & (FLAG_TOV | FLAG_ICF)) || ticks == UINT32_MAX)
-            ticks = least(ticks, end - v);
+        uint32_t end =
+            ticks_to_end(t); /* always: what lies behind the counter, or above TOP, is looked for anew there */
+        if ((wanted & FLAG_TOV) && t->wave == WAVE_FAST && v < t->top)
+            ticks = least(ticks, end - 1);
+        ticks = least(ticks, end);
     }
     if (t->blocked)
         ticks = 0;
