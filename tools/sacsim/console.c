@@ -12,12 +12,12 @@
 #include <unistd.h>
 
 /* ECMA-48 and DEC: what every terminal emulator of today knows. */
-#define SAVE_CURSOR    "\0337"
+#define SAVE_CURSOR "\0337"
 #define RESTORE_CURSOR "\0338"
-#define WHOLE_SCREEN   "\033[r" /* no scroll region; moves the cursor home */
-#define CLEAR_BELOW    "\033[J" /* from the cursor on */
+#define WHOLE_SCREEN "\033[r" /* no scroll region; moves the cursor home */
+#define CLEAR_BELOW "\033[J"  /* from the cursor on */
 #define DOWN_OR_SCROLL "\033D"
-#define UP             "\033[A"
+#define UP "\033[A"
 
 enum { ROWS_MIN = 4, COLUMNS_MIN = 20, COLUMNS_MAX = 300 };
 
@@ -34,7 +34,8 @@ static struct {
 
 /* -- writing --------------------------------------------------------------------------------------------------- */
 
-static void put(int fd, const char *bytes, size_t count) {
+static void put(int fd, const char *bytes, size_t count)
+{
     while (count > 0) {
         ssize_t done = write(fd, bytes, count);
 
@@ -56,37 +57,36 @@ static void put(int fd, const char *bytes, size_t count) {
     }
 }
 
-static void put_text(const char *text) {
+static void put_text(const char *text)
+{
     put(STDOUT_FILENO, text, strlen(text));
 }
 
-static void follow(const unsigned char *bytes, size_t count) {
+static void follow(const unsigned char *bytes, size_t count)
+{
     for (size_t i = 0; i < count; i++) {
         switch (console.sequence) {
-        case PLAIN:
-            console.sequence = bytes[i] == 033 ? AFTER_ESC : PLAIN;
-            break;
-        case AFTER_ESC:
-            console.sequence = bytes[i] == '[' ? IN_CSI : PLAIN;
-            break;
-        case IN_CSI:
-            console.sequence = bytes[i] >= 0x40 && bytes[i] <= 0x7e ? PLAIN : IN_CSI;
-            break;
+        case PLAIN: console.sequence = bytes[i] == 033 ? AFTER_ESC : PLAIN; break;
+        case AFTER_ESC: console.sequence = bytes[i] == '[' ? IN_CSI : PLAIN; break;
+        case IN_CSI: console.sequence = bytes[i] >= 0x40 && bytes[i] <= 0x7e ? PLAIN : IN_CSI; break;
         }
     }
 }
 
-void console_write(const void *bytes, size_t count) {
+void console_write(const void *bytes, size_t count)
+{
     follow(bytes, count);
     put(STDOUT_FILENO, bytes, count);
 }
 
-void console_print(const char *line) {
+void console_print(const char *line)
+{
     put_text(line);
     put_text(console.screen ? "\r\n" : "\n");
 }
 
-void console_say(const char *format, ...) {
+void console_say(const char *format, ...)
+{
     char line[512];
     va_list arguments;
     bool terminal = isatty(STDERR_FILENO);
@@ -99,15 +99,18 @@ void console_say(const char *format, ...) {
 
 /* -- status line ----------------------------------------------------------------------------------------------- */
 
-bool console_has_status(void) {
+bool console_has_status(void)
+{
     return console.region;
 }
 
-unsigned console_columns(void) {
+unsigned console_columns(void)
+{
     return console.columns;
 }
 
-static void leave_region(void) {
+static void leave_region(void)
+{
     if (console.region) {
         console.region = 0;
         put_text(SAVE_CURSOR WHOLE_SCREEN RESTORE_CURSOR CLEAR_BELOW);
@@ -115,7 +118,8 @@ static void leave_region(void) {
 }
 
 /* Makes the bottom row ours: the cursor goes one row up if it stands there. */
-static void enter_region(void) {
+static void enter_region(void)
+{
     struct winsize size;
     char text[64];
 
@@ -133,18 +137,21 @@ static void enter_region(void) {
     put_text(text);
 }
 
-void console_resized(void) {
+void console_resized(void)
+{
     leave_region();
     enter_region();
 }
 
-void console_set_status(bool on) {
+void console_set_status(bool on)
+{
     leave_region();
     console.wanted = on && console.screen;
     enter_region();
 }
 
-void console_status(const char *text) {
+void console_status(const char *text)
+{
     char line[COLUMNS_MAX + 64];
     int width = (int)(console.columns < COLUMNS_MAX ? console.columns : COLUMNS_MAX);
 
@@ -159,7 +166,8 @@ void console_status(const char *text) {
 
 /* -- raw keys, and the way back ---------------------------------------------------------------------------------- */
 
-static void raw_keys(void) {
+static void raw_keys(void)
+{
     struct termios raw = console.before;
 
     cfmakeraw(&raw);
@@ -168,7 +176,8 @@ static void raw_keys(void) {
     console.raw = tcsetattr(STDIN_FILENO, TCSADRAIN, &raw) == 0;
 }
 
-static void open_again(void) {
+static void open_again(void)
+{
     if (console.keys) {
         raw_keys();
     }
@@ -178,7 +187,8 @@ static void open_again(void) {
 }
 
 /* Only what a signal handler may call. */
-void console_restore(void) {
+void console_restore(void)
+{
     if (console.region) {
         static const char back[] = "\033[0m" SAVE_CURSOR WHOLE_SCREEN RESTORE_CURSOR CLEAR_BELOW;
 
@@ -191,13 +201,15 @@ void console_restore(void) {
     }
 }
 
-static void on_crash(int signal_number) {
+static void on_crash(int signal_number)
+{
     console_restore();
     signal(signal_number, SIG_DFL);
     raise(signal_number);
 }
 
-void console_open(bool status) {
+void console_open(bool status)
+{
     static const int crashes[] = {SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT};
     const char *term = getenv("TERM");
 
@@ -211,22 +223,27 @@ void console_open(bool status) {
     open_again();
 }
 
-void console_reopen(void) {
+void console_reopen(void)
+{
     open_again();
 }
 
-void console_abandon(void) {
+void console_abandon(void)
+{
     console.abandoned = 1;
 }
 
-bool console_keys(void) {
+bool console_keys(void)
+{
     return console.keys;
 }
 
-bool console_screen(void) {
+bool console_screen(void)
+{
     return console.screen;
 }
 
-bool console_hung_up(void) {
+bool console_hung_up(void)
+{
     return console.hung_up;
 }

@@ -10,7 +10,8 @@
 
 #include "console.h"
 
-static bool replace(const char *path, const uint8_t *cells) {
+static bool replace(const char *path, const uint8_t *cells)
+{
     char *temporary;
     bool ok = false;
     int fd;
@@ -43,7 +44,8 @@ static bool replace(const char *path, const uint8_t *cells) {
     return ok;
 }
 
-static bool load(eeprom_file_t *f, int fd) {
+static bool load(eeprom_file_t *f, int fd)
+{
     uint8_t more;
     ssize_t got = read(fd, f->saved, sizeof f->saved);
 
@@ -58,7 +60,8 @@ static bool load(eeprom_file_t *f, int fd) {
     return true;
 }
 
-bool eeprom_file_open(eeprom_file_t *f, const char *path) {
+bool eeprom_file_open(eeprom_file_t *f, const char *path)
+{
     int fd = open(path, O_RDONLY | O_CLOEXEC);
     bool ok;
 
@@ -78,7 +81,8 @@ bool eeprom_file_open(eeprom_file_t *f, const char *path) {
     return ok;
 }
 
-bool eeprom_file_save(eeprom_file_t *f, const uint8_t *cells) {
+bool eeprom_file_save(eeprom_file_t *f, const uint8_t *cells)
+{
     if (memcmp(f->saved, cells, sizeof f->saved) == 0) {
         return true;
     }
@@ -89,7 +93,8 @@ bool eeprom_file_save(eeprom_file_t *f, const uint8_t *cells) {
     return true;
 }
 
-void eeprom_file_close(eeprom_file_t *f) {
+void eeprom_file_close(eeprom_file_t *f)
+{
     free(f->path);
     f->path = NULL;
 }

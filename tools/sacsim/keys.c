@@ -1,5 +1,6 @@
 #include "keys.h"
 
+#include <ctype.h>
 #include <stddef.h>
 
 const char *const keys_help[] = {
@@ -16,47 +17,28 @@ const char *const keys_help[] = {
     NULL,
 };
 
-keys_action_t keys_feed(keys_t *k, uint8_t key) {
+keys_action_t keys_feed(keys_t *k, uint8_t key)
+{
     if (!k->escaped) {
         k->escaped = key == KEYS_ESCAPE;
         return k->escaped ? KEYS_NOTHING : KEYS_BYTE;
     }
     k->escaped = false;
-    switch (key) {
-    case 'q':
-    case 'Q':
-    case 0x11: /* Ctrl-Q and the others: with the Ctrl key still down */
-        return KEYS_QUIT;
-    case 'r':
-    case 'R':
-    case 0x12:
-        return KEYS_RESET;
-    case 'p':
-    case 'P':
-    case 0x10:
-        return KEYS_POWER;
-    case 'e':
-    case 'E':
-    case 0x05:
-        return KEYS_ESTOP;
-    case 'y':
-    case 'Y':
-    case 0x19:
-        return KEYS_SYNC;
-    case 'f':
-    case 'F':
-    case 0x06:
-        return KEYS_FACTORY;
-    case 's':
-    case 'S':
-    case 0x13:
-        return KEYS_STATUS;
-    case '?':
-    case 'h':
-        return KEYS_HELP;
-    case KEYS_ESCAPE:
+    if (key == KEYS_ESCAPE) {
         return KEYS_BYTE;
-    default:
-        return KEYS_UNKNOWN;
+    }
+    if (key < 0x20) {
+        key |= 0x60; /* a letter with the Ctrl key still down */
+    }
+    switch (tolower(key)) {
+    case 'q': return KEYS_QUIT;
+    case 'r': return KEYS_RESET;
+    case 'p': return KEYS_POWER;
+    case 'e': return KEYS_ESTOP;
+    case 'y': return KEYS_SYNC;
+    case 'f': return KEYS_FACTORY;
+    case 's': return KEYS_STATUS;
+    case '?': return KEYS_HELP;
+    default: return KEYS_UNKNOWN;
     }
 }

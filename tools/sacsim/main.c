@@ -5,7 +5,8 @@
 #include "options.h"
 #include "session.h"
 
-int main(int argc, char **argv) {
+int main(int argc, char **argv)
+{
     options_t options;
     int code;
 

@@ -2,11 +2,13 @@
 
 #include "test/board/board.h"
 
-void meter_init(meter_t *m, uint8_t cw_level, uint8_t dir_level) {
+void meter_init(meter_t *m, uint8_t cw_level, uint8_t dir_level)
+{
     *m = (meter_t){.cw_level = cw_level, .dir_level = dir_level};
 }
 
-double meter_read(meter_t *m, uint64_t cycle, bool standing) {
+double meter_read(meter_t *m, uint64_t cycle, bool standing)
+{
     uint64_t pulses = m->pulses - m->base_pulses;
     double pause = (double)(cycle - m->last_rise_cycle);
 

@@ -26,7 +26,8 @@ typedef struct {
 
 void meter_init(meter_t *m, uint8_t cw_level, uint8_t dir_level);
 
-static inline void meter_clk_rise(meter_t *m, uint64_t cycle) {
+static inline void meter_clk_rise(meter_t *m, uint64_t cycle)
+{
     m->position_pulses += m->dir_level == m->cw_level ? 1 : -1;
     if (!m->moving && m->pulses == m->base_pulses) {
         m->base_cycle = cycle;
@@ -35,7 +36,8 @@ static inline void meter_clk_rise(meter_t *m, uint64_t cycle) {
     m->last_rise_cycle = cycle;
 }
 
-static inline void meter_dir(meter_t *m, uint8_t level) {
+static inline void meter_dir(meter_t *m, uint8_t level)
+{
     m->dir_level = level;
 }
 

@@ -62,7 +62,8 @@ static const struct argp_option options[] = {
     {0},
 };
 
-static double number(struct argp_state *state, const char *what, const char *text, double low, double high) {
+static double number(struct argp_state *state, const char *what, const char *text, double low, double high)
+{
     char *end;
     double value = strtod(text, &end);
 
@@ -72,7 +73,8 @@ static double number(struct argp_state *state, const char *what, const char *tex
     return value;
 }
 
-static unsigned whole(struct argp_state *state, const char *what, const char *text, unsigned low, unsigned high) {
+static unsigned whole(struct argp_state *state, const char *what, const char *text, unsigned low, unsigned high)
+{
     double value = number(state, what, text, low, high);
 
     if (value != floor(value)) {
@@ -81,7 +83,8 @@ static unsigned whole(struct argp_state *state, const char *what, const char *te
     return (unsigned)value;
 }
 
-static void list_posts(void) {
+static void list_posts(void)
+{
     size_t count;
     const post_t *all = posts(&count);
 
@@ -90,7 +93,8 @@ static void list_posts(void) {
     }
 }
 
-static const post_t *named_post(struct argp_state *state, const char *what, const char *name) {
+static const post_t *named_post(struct argp_state *state, const char *what, const char *name)
+{
     const post_t *post = post_find(name);
 
     if (post == NULL) {
@@ -99,7 +103,8 @@ static const post_t *named_post(struct argp_state *state, const char *what, cons
     return post;
 }
 
-static void add_pin(options_t *o, const post_t *post) {
+static void add_pin(options_t *o, const post_t *post)
+{
     for (size_t i = 0; i < o->pin_count; i++) {
         if (o->pins[i] == post) {
             return;
@@ -110,7 +115,8 @@ static void add_pin(options_t *o, const post_t *post) {
     }
 }
 
-static void parse_pins(struct argp_state *state, options_t *o, const char *arg) {
+static void parse_pins(struct argp_state *state, options_t *o, const char *arg)
+{
     size_t count;
     const post_t *all = posts(&count);
     char *names = strdup(arg);
@@ -133,7 +139,8 @@ static void parse_pins(struct argp_state *state, options_t *o, const char *arg) 
     free(names);
 }
 
-static void parse_wire(struct argp_state *state, options_t *o, const char *arg) {
+static void parse_wire(struct argp_state *state, options_t *o, const char *arg)
+{
     char *names = strdup(arg);
     char *input = strchr(names, '=');
 
@@ -154,7 +161,8 @@ static void parse_wire(struct argp_state *state, options_t *o, const char *arg) 
     free(names);
 }
 
-static void check(struct argp_state *state, const options_t *o) {
+static void check(struct argp_state *state, const options_t *o)
+{
     if (o->image == NULL) {
         argp_error(state, "which image? e.g. build/sac.elf");
     }
@@ -166,74 +174,41 @@ static void check(struct argp_state *state, const options_t *o) {
     }
 }
 
-static error_t parse(int key, char *arg, struct argp_state *state) {
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
     options_t *o = state->input;
 
     switch (key) {
-    case 'f':
-        o->fast = true;
-        break;
-    case 't':
-        o->for_seconds = number(state, "--for", arg, 1e-6, 1e9);
-        break;
-    case KEY_LINGER:
-        o->linger_ms = number(state, "--linger", arg, 1, 1e9);
-        break;
-    case KEY_WIRE:
-        parse_wire(state, o, arg);
-        break;
-    case 'E':
-        o->eeprom = arg;
-        break;
-    case 'b':
-        o->baud = number(state, "--baud", arg, 300, 2e6);
-        break;
-    case 'p':
-        o->pty = true;
-        break;
-    case 'l':
-        o->link = arg;
-        break;
-    case KEY_NO_RESET:
-        o->reset_on_open = false;
-        break;
-    case 'e':
-        o->edges = arg;
-        break;
-    case KEY_VCD:
-        o->vcd = arg;
-        break;
-    case 'P':
-        parse_pins(state, o, arg);
-        break;
-    case KEY_NO_STATUS:
-        o->status = false;
-        break;
-    case KEY_STEPS_PER_REV:
-        o->steps_per_rev = whole(state, "--steps-per-rev", arg, 1, 100000);
-        break;
-    case KEY_MICROSTEPS:
-        o->microsteps = whole(state, "--microsteps", arg, 1, 256);
-        break;
-    case KEY_CW:
-        o->cw_level = (uint8_t)whole(state, "--cw", arg, 0, 1);
-        break;
+    case 'f': o->fast = true; break;
+    case 't': o->for_seconds = number(state, "--for", arg, 1e-6, 1e9); break;
+    case KEY_LINGER: o->linger_ms = number(state, "--linger", arg, 1, 1e9); break;
+    case KEY_WIRE: parse_wire(state, o, arg); break;
+    case 'E': o->eeprom = arg; break;
+    case 'b': o->baud = number(state, "--baud", arg, 300, 2e6); break;
+    case 'p': o->pty = true; break;
+    case 'l': o->link = arg; break;
+    case KEY_NO_RESET: o->reset_on_open = false; break;
+    case 'e': o->edges = arg; break;
+    case KEY_VCD: o->vcd = arg; break;
+    case 'P': parse_pins(state, o, arg); break;
+    case KEY_NO_STATUS: o->status = false; break;
+    case KEY_STEPS_PER_REV: o->steps_per_rev = whole(state, "--steps-per-rev", arg, 1, 100000); break;
+    case KEY_MICROSTEPS: o->microsteps = whole(state, "--microsteps", arg, 1, 256); break;
+    case KEY_CW: o->cw_level = (uint8_t)whole(state, "--cw", arg, 0, 1); break;
     case ARGP_KEY_ARG:
         if (o->image != NULL) {
             argp_error(state, "one image at a time: '%s' is one too many", arg);
         }
         o->image = arg;
         break;
-    case ARGP_KEY_END:
-        check(state, o);
-        break;
-    default:
-        return ARGP_ERR_UNKNOWN;
+    case ARGP_KEY_END: check(state, o); break;
+    default: return ARGP_ERR_UNKNOWN;
     }
     return 0;
 }
 
-void options_parse(options_t *o, int argc, char **argv) {
+void options_parse(options_t *o, int argc, char **argv)
+{
     static const struct argp parser = {options, parse, "IMAGE.elf", doc, NULL, NULL, NULL};
 
     *o = (options_t){

@@ -5,7 +5,7 @@
 #include "test/board/board.h"
 
 #define CYCLES_PER_MS (BOARD_CPU_HZ / 1000)
-#define NS_PER_MS     INT64_C(1000000)
+#define NS_PER_MS INT64_C(1000000)
 
 enum {
     SLICE_MS = 4,        /* how long a key may wait for the board */
@@ -16,7 +16,8 @@ enum {
     WARN_LOST_MS = 750, /* of a window */
 };
 
-int64_t pace_now_ns(void) {
+int64_t pace_now_ns(void)
+{
     struct timespec t;
 
     clock_gettime(CLOCK_MONOTONIC, &t);
@@ -24,17 +25,20 @@ int64_t pace_now_ns(void) {
 }
 
 /* 62.5 ns a cycle */
-static int64_t due_ns(const pace_t *p, uint64_t cycle) {
+static int64_t due_ns(const pace_t *p, uint64_t cycle)
+{
     return p->base_ns + (int64_t)((cycle - p->base_cycle) * 125 / 2);
 }
 
-void pace_start(pace_t *p, bool fast, uint64_t cycle) {
+void pace_start(pace_t *p, bool fast, uint64_t cycle)
+{
     int64_t now = pace_now_ns();
 
     *p = (pace_t){.fast = fast, .base_cycle = cycle, .base_ns = now, .window_ns = now, .window_cycle = cycle};
 }
 
-uint64_t pace_target(const pace_t *p, uint64_t cycle) {
+uint64_t pace_target(const pace_t *p, uint64_t cycle)
+{
     int64_t slice_ms = SLICE_MS;
 
     if (!p->fast) {
@@ -48,7 +52,8 @@ uint64_t pace_target(const pace_t *p, uint64_t cycle) {
 }
 
 /* Behind by so much that it is given up: time goes on from here. */
-static void give_up(pace_t *p, uint64_t cycle, int64_t now, int64_t behind) {
+static void give_up(pace_t *p, uint64_t cycle, int64_t now, int64_t behind)
+{
     p->base_cycle = cycle;
     p->base_ns = now;
     if (behind < SUSPENDED_MS * NS_PER_MS) {
@@ -56,7 +61,8 @@ static void give_up(pace_t *p, uint64_t cycle, int64_t now, int64_t behind) {
     }
 }
 
-double pace_wait(pace_t *p, uint64_t cycle) {
+double pace_wait(pace_t *p, uint64_t cycle)
+{
     int64_t now, due;
     double speed = 0.0;
 

@@ -12,7 +12,8 @@
 
 static post_t table[] = {BOARD_POSTS(ROW)};
 
-const post_t *posts(size_t *count) {
+const post_t *posts(size_t *count)
+{
     static bool lowered;
 
     *count = sizeof table / sizeof table[0];
@@ -27,7 +28,8 @@ const post_t *posts(size_t *count) {
     return table;
 }
 
-const post_t *post_find(const char *name) {
+const post_t *post_find(const char *name)
+{
     size_t count;
     const post_t *all = posts(&count);
 

@@ -21,13 +21,15 @@ struct trace {
     char name[PIN_NUMBERS][16];
 };
 
-static void put_le(FILE *f, uint64_t value, unsigned bytes) {
+static void put_le(FILE *f, uint64_t value, unsigned bytes)
+{
     for (unsigned i = 0; i < bytes; i++) {
         putc((int)(value >> (8 * i) & 0xff), f);
     }
 }
 
-static void put_varint(FILE *f, uint64_t value) {
+static void put_varint(FILE *f, uint64_t value)
+{
     while (value >= 0x80) {
         putc_unlocked((int)(value & 0x7f) | 0x80, f);
         value >>= 7;
@@ -35,7 +37,8 @@ static void put_varint(FILE *f, uint64_t value) {
     putc_unlocked((int)value, f);
 }
 
-static void compact_header(const trace_t *t, const uint8_t *levels, uint64_t cycle) {
+static void compact_header(const trace_t *t, const uint8_t *levels, uint64_t cycle)
+{
     fputs("SACEDGE", t->file);
     putc(VERSION, t->file);
     put_le(t->file, BOARD_CPU_HZ, 4);
@@ -50,11 +53,13 @@ static void compact_header(const trace_t *t, const uint8_t *levels, uint64_t cyc
 }
 
 /* The identifier of a VCD variable: one printable character each. */
-static char vcd_id(size_t index) {
+static char vcd_id(size_t index)
+{
     return (char)('!' + index);
 }
 
-static void vcd_header(const trace_t *t, const uint8_t *levels, uint64_t cycle) {
+static void vcd_header(const trace_t *t, const uint8_t *levels, uint64_t cycle)
+{
     fputs("$comment SAC's simulated Arduino Nano: 625 units of time are one cycle of its 16 MHz clock $end\n"
           "$timescale 100 ps $end\n"
           "$scope module nano $end\n",
@@ -69,7 +74,8 @@ static void vcd_header(const trace_t *t, const uint8_t *levels, uint64_t cycle) 
     fputs("$end\n", t->file);
 }
 
-static void vcd_time(trace_t *t, uint64_t cycle) {
+static void vcd_time(trace_t *t, uint64_t cycle)
+{
     if (cycle != t->last_cycle) {
         fprintf(t->file, "#%" PRIu64 "\n", cycle * VCD_UNITS_PER_CYCLE);
         t->last_cycle = cycle;
@@ -77,7 +83,8 @@ static void vcd_time(trace_t *t, uint64_t cycle) {
 }
 
 trace_t *trace_open(const char *path, trace_format_t format, const post_t *const *pins, const uint8_t *levels,
-                    size_t pin_count, uint64_t cycle) {
+                    size_t pin_count, uint64_t cycle)
+{
     trace_t *t = calloc(1, sizeof *t);
 
     if (t == NULL || (t->path = strdup(path)) == NULL || (t->file = fopen(path, "wbe")) == NULL) {
@@ -101,34 +108,28 @@ trace_t *trace_open(const char *path, trace_format_t format, const post_t *const
         memcpy(t->name[i], pins[i]->name, sizeof t->name[i]);
     }
     switch (format) {
-    case TRACE_COMPACT:
-        compact_header(t, levels, cycle);
-        break;
-    case TRACE_CSV:
-        fputs("cycle,time_s,pin,level\n", t->file);
-        break;
-    case TRACE_VCD:
-        vcd_header(t, levels, cycle);
-        break;
+    case TRACE_COMPACT: compact_header(t, levels, cycle); break;
+    case TRACE_CSV: fputs("cycle,time_s,pin,level\n", t->file); break;
+    case TRACE_VCD: vcd_header(t, levels, cycle); break;
     }
     return t;
 }
 
-static void compact_record(trace_t *t, uint64_t cycle, unsigned index, unsigned level) {
+static void compact_record(trace_t *t, uint64_t cycle, unsigned index, unsigned level)
+{
     put_varint(t->file, (cycle - t->last_cycle) << (t->index_bits + 1) | index << 1 | level);
     t->last_cycle = cycle;
 }
 
-void trace_edge(trace_t *t, board_edge_t edge) {
+void trace_edge(trace_t *t, board_edge_t edge)
+{
     int index = edge.pin < PIN_NUMBERS ? t->index[edge.pin] : -1;
 
     if (index < 0) {
         return;
     }
     switch (t->format) {
-    case TRACE_COMPACT:
-        compact_record(t, edge.cycle, (unsigned)index, edge.level & 1u);
-        break;
+    case TRACE_COMPACT: compact_record(t, edge.cycle, (unsigned)index, edge.level & 1u); break;
     case TRACE_CSV:
         /* seconds with the ten decimals of 62.5 ns: nothing is rounded */
         fprintf(t->file, "%" PRIu64 ",%" PRIu64 ".%010" PRIu64 ",%s,%u\n", edge.cycle,
@@ -142,22 +143,19 @@ void trace_edge(trace_t *t, board_edge_t edge) {
     }
 }
 
-bool trace_ok(const trace_t *t) {
+bool trace_ok(const trace_t *t)
+{
     return !ferror(t->file);
 }
 
-bool trace_close(trace_t *t, uint64_t cycle) {
+bool trace_close(trace_t *t, uint64_t cycle)
+{
     bool ok;
 
     switch (t->format) {
-    case TRACE_COMPACT:
-        compact_record(t, cycle, (unsigned)t->pin_count, 0);
-        break;
-    case TRACE_CSV:
-        break;
-    case TRACE_VCD:
-        vcd_time(t, cycle);
-        break; /* how long the last levels lasted */
+    case TRACE_COMPACT: compact_record(t, cycle, (unsigned)t->pin_count, 0); break;
+    case TRACE_CSV: break;
+    case TRACE_VCD: vcd_time(t, cycle); break; /* how long the last levels lasted */
     }
     ok = !ferror(t->file);
     ok = fclose(t->file) == 0 && ok;
