@@ -521,6 +521,18 @@ static void test_cbi_on_tifr1_clears_nothing(void)
     TEST_ASSERT_EQUAL_HEX8(TOV | OCFA | OCFB, read(TIFR1));
 }
 
+static void test_a_request_withdrawn_by_its_flag_comes_again_at_the_next_match(void)
+{
+    start_timer1(4, 0, 999, 0, CLK_1);
+    write(TIMSK1, OCFA);
+    run(1500);
+    write(TIFR1, OCFA);
+    run(3000);
+    allow_interrupts();
+    run(30);
+    TEST_ASSERT_EQUAL(1, get("counts", VECTOR_COMPA1));
+}
+
 static void test_all_16_bit_registers_share_one_byte_for_the_high_half(void)
 {
     write(TCNT1 + 1, 0x34);
@@ -965,6 +977,7 @@ int main(void)
     RUN_TEST(test_writing_a_one_clears_that_flag_only);
     RUN_TEST(test_sbi_on_tifr1_clears_its_bit_only);
     RUN_TEST(test_cbi_on_tifr1_clears_nothing);
+    RUN_TEST(test_a_request_withdrawn_by_its_flag_comes_again_at_the_next_match);
     RUN_TEST(test_all_16_bit_registers_share_one_byte_for_the_high_half);
     RUN_TEST(test_reading_a_compare_register_leaves_the_shared_byte_alone);
     RUN_TEST(test_the_high_byte_alone_changes_nothing);

@@ -273,8 +273,6 @@ void timer_plan(counter_t *t)
             ticks = least(ticks, end - 1);
         ticks = least(ticks, end);
     }
-    if (t->blocked)
-        ticks = 0;
     event_at(b, t->slot, edge_cycle(t, ((t->at - t->prescaler->zero) >> t->shift) + ticks + 1u), t->event);
 }
 
