@@ -228,9 +228,8 @@ static void show_status(session_t *s, int64_t now)
     console_status(line.text);
 }
 
-static void show_help(const session_t *s)
+static void show_help(void)
 {
-    (void)s;
     console_print("");
     for (size_t i = 0; keys_help[i] != NULL; i++) {
         console_print(keys_help[i]);
@@ -400,11 +399,6 @@ static size_t room_on_line(const session_t *s, uint64_t until)
     return from >= until ? 0 : 1 + (size_t)((double)(until - from) / s->cycles_per_byte);
 }
 
-static void reset(session_t *s, board_reset_t cause)
-{
-    board_reset(s->board, cause);
-}
-
 /* -- the user's side ---------------------------------------------------------------------------------------------- */
 
 static void end(session_t *s, int code)
@@ -440,11 +434,11 @@ static void own_key(session_t *s, keys_action_t action, uint8_t key)
         break;
     case KEYS_QUIT: end(s, EXIT_SUCCESS); break;
     case KEYS_RESET:
-        reset(s, BOARD_RESET_EXTERNAL);
+        board_reset(s->board, BOARD_RESET_EXTERNAL);
         notice(s, "reset");
         break;
     case KEYS_POWER:
-        reset(s, BOARD_RESET_POWER_ON);
+        board_reset(s->board, BOARD_RESET_POWER_ON);
         notice(s, "power off and on");
         break;
     case KEYS_ESTOP: hold(s, s->estop, &s->estop_held, "Estop"); break;
@@ -455,7 +449,7 @@ static void own_key(session_t *s, keys_action_t action, uint8_t key)
         notice(s, "sync grounded for %d ms", SYNC_MS);
         break;
     case KEYS_STATUS: console_set_status(!console_has_status()); break;
-    case KEYS_HELP: show_help(s); break;
+    case KEYS_HELP: show_help(); break;
     case KEYS_UNKNOWN: notice(s, "Ctrl-] ? lists the keys"); break;
     }
 }
@@ -523,7 +517,7 @@ static void read_pty(session_t *s, uint64_t until)
     }
     if (s->reset_at_ns != 0 && pace_now_ns() >= s->reset_at_ns) {
         s->reset_at_ns = 0;
-        reset(s, BOARD_RESET_EXTERNAL);
+        board_reset(s->board, BOARD_RESET_EXTERNAL);
         notice(s, "%s opened: reset", s->pty->name);
     }
     max = room_on_line(s, until);
