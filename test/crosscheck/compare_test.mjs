@@ -42,7 +42,8 @@ const tests = {
     },
     'a missing last edge fails': () =>
         assert.notDeepEqual(verdict(same, (edge, i) => (i === PULSES - 1 ? null : edge)), []),
-    'a start cut short passes': () => assert.deepEqual(verdict((edge, i) => later(edge, i < 12 ? 0 : 9), undefined, [ANY, 8]), []),
+    'a start cut short passes': () =>
+        assert.deepEqual(verdict((edge, i) => later(edge, i < 12 ? 0 : 9), undefined, [ANY, 8]), []),
     'a start cut short by another edge fails': () =>
         assert.notDeepEqual(verdict((edge, i) => (i === 11 ? null : edge), undefined, [ANY, 8]), []),
     'fewer edges than commanded beside a start cut short fail': () =>

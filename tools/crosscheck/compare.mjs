@@ -27,14 +27,16 @@ function difference(a, b, bound) {
 export const ANY = null;
 
 /* witness.edges: [{ exact, raw, dir }]; board.edges: [{ cycle, dir }]; trains: how many pulses each start from
- * standstill must make, at most one of them ANY. Returns a row of the table; faults is empty when the case has passed. */
+ * standstill must make, at most one of them ANY. Returns a row of the table; faults is empty when the case has
+ * passed. */
 export function compare(name, witness, board, trains) {
     const row = { name, edges: board.edges.length, exact: 0, drift: 0, raw: 0, rawDrift: 0, start: 0, faults: [] };
     const known = trains.reduce((sum, pulses) => sum + pulses, 0);
     const wanted = trains.includes(ANY) ? Math.max(known, board.edges.length) : known;
     if (witness.edges.length !== board.edges.length)
         row.faults.push(`avr8js made ${witness.edges.length} edges, the board ${board.edges.length}`);
-    if (board.edges.length !== wanted) row.faults.push(`${wanted} edges were commanded, the board made ${board.edges.length}`);
+    if (board.edges.length !== wanted)
+        row.faults.push(`${wanted} edges were commanded, the board made ${board.edges.length}`);
     const both = Math.min(witness.edges.length, board.edges.length);
     const turned = board.edges.slice(0, both).findIndex((edge, i) => edge.dir !== witness.edges[i].dir);
     if (turned >= 0) row.faults.push(`dir differs at edge ${turned + 1}`);

@@ -27,7 +27,9 @@ function startBoard({ image, folder, name, typed, untilCycle }) {
     const stem = join(folder, name);
     const orders = typed.map(({ cycle, text }) => `type ${cycle} ${hex(text)}\n`);
     writeFileSync(`${stem}.script`, `${orders.join('')}end ${untilCycle}\n`);
-    const child = spawn(tool, [`${image}.elf`, `${stem}.script`, `${stem}.edges`], { stdio: ['ignore', 'inherit', 'inherit'] });
+    const child = spawn(tool, [`${image}.elf`, `${stem}.script`, `${stem}.edges`], {
+        stdio: ['ignore', 'inherit', 'inherit'],
+    });
     return new Promise((resolve, reject) => {
         child.on('error', reject);
         child.on('exit', (status) => {

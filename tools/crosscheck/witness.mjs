@@ -16,7 +16,9 @@ const RAM_BYTES = 0x800;
 const EEPROM_BYTES = 1024;
 const CLK_BIT = 1 << 2;
 const DIR_BIT = 1 << 5;
-/* Start bit to RXC0 at 38,400 Bd: 153 samples of 26 cycles, and half a sample till the first (datasheet 20.8). */
+/* A byte at 38,400 Bd as the sender times it; from its start bit to RXC0: 153 samples of 26 cycles,
+ * and half a sample till the first (datasheet 20.8). */
+const BYTE_CYCLES = 10 * (CPU_HZ / 38400);
 const RX_DELAY = 153 * 26 + 13;
 const RXC_BIT = 1 << 7;
 const RXEN_BIT = 1 << 4;
@@ -47,11 +49,10 @@ function keepReceived(cpu, usart) {
     };
 }
 
-/* typed: [{ cycle, text }], bytes back to back from that cycle on; charCycles: 10 bits as the sender times them.
- * rxDelay: from the falling edge of the start bit to the byte in the receiver.
- * Returns { edges: [{ raw, exact, dir }], glitches, text }: raw is the cycle at which avr8js has moved the pin, exact
- * the cycle at which its counter met OCR1B; glitches counts pulses of no length. */
-export function runWitness({ hexPath, typed = [], untilCycle, charCycles = 10 * (CPU_HZ / 38400), rxDelay = RX_DELAY }) {
+/* typed: [{ cycle, text }], bytes back to back, the first start bit at that cycle.
+ * Returns { edges: [{ raw, exact, dir }], text }: raw is the cycle at which avr8js has moved the pin, exact
+ * the cycle at which its counter met OCR1B. */
+export function runWitness({ hexPath, typed = [], untilCycle }) {
     const cpu = new CPU(new Uint16Array(loadHex(hexPath).buffer), RAM_BYTES);
     new AVRWatchdog(cpu, avr8js.watchdogConfig, new AVRClock(cpu, CPU_HZ));
     const portB = new AVRIOPort(cpu, avr8js.portBConfig);
@@ -76,31 +77,20 @@ export function runWitness({ hexPath, typed = [], untilCycle, charCycles = 10 * 
     };
 
     const edges = [];
-    let glitches = 0;
     portB.addListener((now, before) => {
-        if (!((now ^ before) & CLK_BIT)) return;
-        if (now & CLK_BIT) {
-            const { tcnt, ocrA, ocrB, lastCycle, timerMode } = timer1;
-            const late = tcnt >= ocrB ? tcnt - ocrB : tcnt + ocrA + 1 - ocrB;
-            edges.push({
-                raw: cpu.cycles,
-                exact: timerMode === FAST_PWM ? lastCycle - late : cpu.cycles,
-                dir: now & DIR_BIT ? 1 : 0,
-                fall: -1,
-                unreachable: timerMode === FAST_PWM && ocrB >= ocrA,
-            });
-        } else if (edges.length) {
-            const last = edges[edges.length - 1];
-            last.fall = cpu.cycles;
-            if (last.unreachable) {
-                edges.pop();
-                glitches++;
-            }
-        }
+        if (!(now & ~before & CLK_BIT)) return;
+        const { tcnt, ocrA, ocrB, lastCycle, timerMode } = timer1;
+        const counted = timerMode === FAST_PWM;
+        if (counted && ocrB >= ocrA) return; /* the chip makes no pulse here */
+        const late = tcnt >= ocrB ? tcnt - ocrB : tcnt + ocrA + 1 - ocrB;
+        edges.push({ raw: cpu.cycles, exact: counted ? lastCycle - late : cpu.cycles, dir: now & DIR_BIT ? 1 : 0 });
     });
 
     const bytes = typed.flatMap(({ cycle, text: line }) =>
-        Array.from(line, (char, at) => ({ cycle: cycle + Math.round(at * charCycles) + rxDelay, byte: char.charCodeAt(0) }))
+        Array.from(line, (char, at) => ({
+            cycle: cycle + Math.round(at * BYTE_CYCLES) + RX_DELAY,
+            byte: char.charCodeAt(0),
+        }))
     );
     let next = 0;
     while (cpu.cycles < untilCycle) {
@@ -111,5 +101,5 @@ export function runWitness({ hexPath, typed = [], untilCycle, charCycles = 10 * 
         }
         while (next < bytes.length && bytes[next].cycle <= cpu.cycles) usart.writeByte(bytes[next++].byte, true);
     }
-    return { edges, glitches, text };
+    return { edges, text };
 }
