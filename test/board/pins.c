@@ -176,16 +176,15 @@ void pin_override(board_t *b, board_pin_t pin, pin_override_t how, int level, ui
     p->value_level &= (uint8_t)~bit;
     p->force_out &= (uint8_t)~bit;
     p->force_in &= (uint8_t)~bit;
-    switch (how) {
-    case PIN_FREE: break;
-    case PIN_OUTPUT: p->force_out |= bit; /* fall through */
-    case PIN_VALUE:
+    if (how == PIN_VALUE || how == PIN_OUTPUT) {
         p->value |= bit;
         if (level)
             p->value_level |= bit;
-        break;
-    case PIN_INPUT: p->force_in |= bit; break;
     }
+    if (how == PIN_OUTPUT)
+        p->force_out |= bit;
+    if (how == PIN_INPUT)
+        p->force_in |= bit;
     update(b, pin >> 3, cycle);
 }
 
