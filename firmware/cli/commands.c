@@ -192,14 +192,14 @@ static status_t command_later(const char *rest)
 
 /* -- the table -------------------------------------------------------------------------------------------------------- */
 
-#define COMMAND(name, first, second, case_rule, argument, handler, form, help)                                         \
-    static const char form_##name[] FLASH = form;                                                                      \
+#define COMMAND(name, first, second, case_rule, argument, handler, form, help) \
+    static const char form_##name[] FLASH = form;                              \
     static const char help_##name[] FLASH = help;
 #include "cli/commands.def"
 #undef COMMAND
 
 static const command_row_t rows[] FLASH = {
-#define COMMAND(name, first, second, case_rule, argument, handler, form, help)                                         \
+#define COMMAND(name, first, second, case_rule, argument, handler, form, help) \
     {first, second, CASE_##case_rule, ARGUMENT_##argument, handler, form_##name, help_##name},
 #include "cli/commands.def"
 #undef COMMAND

@@ -27,12 +27,10 @@ static bool shown_gap;
 
 /* -- the queue: template of annex E, tab stops of 8 ------------------------------------------------------------------- */
 
-static const char queue_header[] FLASH =
-    "Q\tSteps\t\tRPM\tCycle\t Acc\tDec\tusteps\t deltaT\r\n"
-    "======================================================================\r\n";
-static const char queue_footer[] FLASH =
-    "======================================================================\r\n"
-    "Q is at ";
+static const char queue_header[] FLASH = "Q\tSteps\t\tRPM\tCycle\t Acc\tDec\tusteps\t deltaT\r\n"
+                                         "======================================================================\r\n";
+static const char queue_footer[] FLASH = "======================================================================\r\n"
+                                         "Q is at ";
 static const char queue_legend[] FLASH = "\t+ pulse\t\t\t* linear\t\ts sync\r\n";
 static const char queue_cw[] FLASH = "CW\t";
 static const char queue_ccw[] FLASH = "CCW\t";
@@ -107,9 +105,7 @@ static bool queue_piece(void)
             row++;
         }
         return true;
-    case QUEUE_FOOTER:
-        streamed = queue_footer;
-        return true;
+    case QUEUE_FOOTER: streamed = queue_footer; return true;
     case QUEUE_LEGEND:
         text_put_u32(queue_next_position());
         streamed = queue_legend;
@@ -121,8 +117,7 @@ static bool queue_piece(void)
             text_new_line();
         }
         return false;
-    default:
-        return false;
+    default: return false;
     }
 }
 
@@ -168,8 +163,7 @@ static bool defaults_piece(void)
         text_put_flash(command.flags & MOTION_PULSES ? defaults_pulses : defaults_full_step);
         streamed = defaults_fixed;
         return true;
-    default:
-        return false;
+    default: return false;
     }
 }
 

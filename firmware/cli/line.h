@@ -17,8 +17,8 @@
 
 typedef struct {
     uint8_t length;
-    status_t status;   /* not STATUS_OK: the line will be refused */
-    bool after_return; /* a LF now belongs to the CR before it */
+    status_t status;                /* not STATUS_OK: the line will be refused */
+    bool after_return;              /* a LF now belongs to the CR before it */
     char text[LINE_CHARACTERS + 1]; /* NUL-terminated whenever line_take() has returned */
 } line_t;
 

@@ -39,8 +39,8 @@ enum {
 
 /* motion_syntax_t.given */
 enum {
-    GIVEN_RAMP = 1 << 0,   /* l */
-    GIVEN_ACCEL = 1 << 1,  /* a with a value */
+    GIVEN_RAMP = 1 << 0,  /* l */
+    GIVEN_ACCEL = 1 << 1, /* a with a value */
     GIVEN_DECEL = 1 << 2,
     DEFAULT_ACCEL = 1 << 3, /* a without one: the system default of the ramp that the command ends up with */
     DEFAULT_DECEL = 1 << 4,

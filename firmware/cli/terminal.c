@@ -25,10 +25,10 @@ static line_t line;
 static uint8_t echoed; /* how many characters of the line stand on the screen */
 
 /* What is owed while answers are held back. */
-static bool behind;             /* a prompt is owed; no echo until it is printed */
-static bool owes_new_line;      /* the cursor stands behind the last line that was echoed */
-static status_t owed_status;    /* the first error since, or STATUS_OK */
-static const char *owed_range;  /* of that error */
+static bool behind;            /* a prompt is owed; no echo until it is printed */
+static bool owes_new_line;     /* the cursor stands behind the last line that was echoed */
+static status_t owed_status;   /* the first error since, or STATUS_OK */
+static const char *owed_range; /* of that error */
 
 /* Debug mode: how long the last line took. */
 static bool owes_times;
@@ -215,12 +215,10 @@ bool terminal_poll(void)
 {
     bool worked = false;
     const line_event_t event = take(&worked);
-    const bool pressed = terminal_port_waiting() > PRESSED_BYTES;
     if (event == LINE_ERASED) {
         erase();
     }
-    /* A line is echoed whole or not at all. */
-    if (!behind && echoed != line.length && (!pressed || echoed != 0)) {
+    if (!behind) {
         worked |= echo();
     }
     if (event == LINE_ENDED) {
@@ -231,7 +229,7 @@ bool terminal_poll(void)
             owe(STATUS_OK);
         }
     }
-    if (behind && !pressed) {
+    if (behind && terminal_port_waiting() <= PRESSED_BYTES) {
         worked |= pay();
     }
     return worked;

@@ -19,7 +19,7 @@ enum {
     QUEUE_CONTINUOUS = 0, /* position of the continuous command */
     QUEUE_FIRST = 1,
     QUEUE_LAST = 30,
-    QUEUE_ONE_SHOT = 31,  /* position of the one-shot command */
+    QUEUE_ONE_SHOT = 31, /* position of the one-shot command */
     QUEUE_POSITIONS = 32,
 };
 

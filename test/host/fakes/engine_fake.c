@@ -36,9 +36,7 @@ status_t engine_check(const motion_command_t *command)
     return period_us < 2 || period_us < settings.pulse_us + 1 ? STATUS_PERIOD_TOO_SHORT : STATUS_OK;
 }
 
-void engine_init(void)
-{
-}
+void engine_init(void) {}
 
 bool engine_poll(void)
 {
