@@ -1,0 +1,157 @@
+/* Rows: step rates kept with an exact count, jitter. */
+#include "bench.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+#define COUNT_OF(array) (sizeof(array) / sizeof(array)[0])
+
+typedef struct {
+    uint32_t cycle_us; /* of a full step */
+    uint8_t ustep;
+} rate_t;
+
+static uint32_t rate_ticks(const rate_t *rate)
+{
+    return rate->cycle_us * TICKS_PER_US >> rate->ustep;
+}
+
+static double rate_khz(const rate_t *rate)
+{
+    return (double)TICKS_PER_S / rate_ticks(rate) / 1000.0;
+}
+
+/* Largest distance of any edge from the grid that the first one begins. */
+static uint64_t grid_error(const run_t *run, uint64_t ticks)
+{
+    uint64_t most = 0;
+    for (size_t k = 0; k < run->pulses; k++) {
+        uint64_t ideal = run->rise[0] + k * ticks;
+        uint64_t off = run->rise[k] > ideal ? run->rise[k] - ideal : ideal - run->rise[k];
+        if (off > most)
+            most = off;
+    }
+    return most;
+}
+
+void row_cruise_rate(result_t *result)
+{
+    static const rate_t rates[] = {{4, 1}, {5, 1}, {3, 0}, {4, 0}, {5, 0}, {10, 0}, {30, 0}};
+    const uint64_t pulses = 1000000;
+    result->verdict = VERDICT_NOT_MET;
+    for (size_t i = 0; i < COUNT_OF(rates); i++) {
+        run_t run;
+        char text[80];
+        run_begin(&run, (setup_t){.ustep = rates[i].ustep, .pulse_us = 1, .baud = 38400});
+        snprintf(text, sizeof text, "m%llupvc%ua999d999\n", (unsigned long long)pulses, rates[i].cycle_us);
+        run_type(&run, text);
+        run_until_quiet(&run, TICKS_PER_S / 2, 60 * TICKS_PER_S);
+        uint64_t off = grid_error(&run, rate_ticks(&rates[i]));
+        uint8_t faults = run_faults(&run);
+        bool kept = run.pulses == pulses && off == 0 && run.bad_widths == 0 && faults == 0 &&
+                    run_position(&run) == (int32_t)pulses;
+        if (!kept)
+            detail(result,
+                   "- %g kHz: %zu of %llu pulses, %llu ticks off the grid, %zu pulses of a wrong length, faults %u, "
+                   "position %d\n",
+                   rate_khz(&rates[i]), run.pulses, (unsigned long long)pulses, (unsigned long long)off,
+                   run.bad_widths, faults, run_position(&run));
+        run_end(&run, &result->worst);
+        if (kept) {
+            figure(result, "%g kHz, %llu of %llu pulses, every interval exact", rate_khz(&rates[i]),
+                   (unsigned long long)pulses, (unsigned long long)pulses);
+            if (rate_ticks(&rates[i]) <= 32)
+                result->verdict = VERDICT_MET;
+            return;
+        }
+    }
+    figure(result, "none");
+}
+
+/* Both ramps of one kind up to the rate, while the terminal receives. */
+static bool ramps_kept(result_t *result, const rate_t *rate, bool linear)
+{
+    run_t run;
+    char text[80];
+    ideal_t ideal;
+    ramp_error_t error;
+    motion_t motion = {.steps = UINT32_MAX, .cycle_us = rate->cycle_us, .linear = linear, .ustep = rate->ustep};
+    motion.accel = motion.decel = linear ? 500.0 / (1 << rate->ustep) : 10.0; /* the same in pulses */
+    ideal_plan(&ideal, &motion);
+    uint64_t full_steps = (ideal.accel_pulses + ideal.decel_pulses) >> rate->ustep;
+    motion.steps = full_steps + 20000;
+    ideal_plan(&ideal, &motion);
+    ideal_command(&motion, text, sizeof text);
+
+    setup_t setup = {.ustep = rate->ustep, .pulse_us = (uint8_t)(rate_ticks(rate) < 48 ? 1 : 2), .baud = 250000};
+    run_begin(&run, setup);
+    run_type(&run, text);
+    run_flood(&run, FLOOD_ANSWERED);
+    run_until_pulses(&run, ideal_pulses(&ideal), 120 * TICKS_PER_S);
+    run_until_quiet(&run, TICKS_PER_S / 2, 5 * TICKS_PER_S);
+    run_flood(&run, FLOOD_NONE);
+    run_for(&run, TICKS_PER_S / 10);
+    ideal_compare(&ideal, &run, 0, &error);
+    size_t echoed;
+    board_uart_received(run.board, &echoed);
+    uint8_t faults = run_faults(&run);
+    uint32_t overruns = board_uart_overruns(run.board);
+    bool kept = run.pulses == ideal_pulses(&ideal) && run_position(&run) == (int32_t)run.pulses && faults == 0 &&
+                overruns == 0 && run.bad_widths == 0;
+    detail(result,
+           "- %s to %g kHz: %zu of %llu pulses, position %d, faults %u, %zu lines received, %u bytes lost; error %.4f %% rms, "
+           "%.3f ticks max, %.4f %% max beyond a tick (at %llu), sum %+.1f ticks\n",
+           linear ? "linear" : "harmonic", rate_khz(rate), run.pulses, (unsigned long long)ideal_pulses(&ideal),
+           run_position(&run), faults, run.fed_lines, overruns, error.rms_percent, error.max_ticks, error.worst_ticks_percent,
+           (unsigned long long)error.worst_at, error.sum_ticks);
+    run_end(&run, &result->worst);
+    return kept;
+}
+
+void row_ramp_rate(result_t *result)
+{
+    static const rate_t harmonic[] = {{4, 1}, {5, 1}, {3, 0}, {7, 1}, {4, 0}, {9, 1}, {5, 0}, {6, 0}, {8, 0}, {10, 0}};
+    static const rate_t linear[] = {{4, 0}, {5, 0}, {6, 0}, {8, 0}, {10, 0}, {20, 0}};
+    double best[2] = {0, 0};
+    for (size_t i = 0; i < COUNT_OF(harmonic) && best[0] == 0; i++)
+        if (ramps_kept(result, &harmonic[i], false))
+            best[0] = rate_khz(&harmonic[i]);
+    for (size_t i = 0; i < COUNT_OF(linear) && best[1] == 0; i++)
+        if (ramps_kept(result, &linear[i], true))
+            best[1] = rate_khz(&linear[i]);
+    figure(result, "harmonic %g kHz, linear %g kHz", best[0], best[1]);
+    result->verdict = best[0] >= 200 && best[1] >= 200 ? VERDICT_MET : VERDICT_NOT_MET;
+}
+
+void row_jitter(result_t *result)
+{
+    static const rate_t rates[] = {{30, 0}, {10, 0}, {5, 0}, {3, 0}, {4, 1}};
+    static const uint32_t bauds[] = {38400, 250000};
+    uint64_t worst = 0;
+    bool exact = true;
+    for (size_t b = 0; b < COUNT_OF(bauds); b++) {
+        detail(result, "- %u Bd:", bauds[b]);
+        for (size_t i = 0; i < COUNT_OF(rates); i++) {
+            run_t run;
+            char text[80];
+            uint64_t pulses = TICKS_PER_S / rate_ticks(&rates[i]); /* one second */
+            run_begin(&run, (setup_t){.ustep = rates[i].ustep, .pulse_us = 1, .baud = bauds[b]});
+            snprintf(text, sizeof text, "m%llupvc%ua999d999\n", (unsigned long long)pulses, rates[i].cycle_us);
+            run_type(&run, text);
+            run_flood(&run, FLOOD_SOLID);
+            run_until_quiet(&run, TICKS_PER_S / 10, 5 * TICKS_PER_S);
+            uint64_t off = grid_error(&run, rate_ticks(&rates[i]));
+            size_t sent;
+            board_uart_received(run.board, &sent);
+            detail(result, " %g kHz %llu cycles (%zu of %llu pulses, %zu bytes echoed and answered)%s",
+                   rate_khz(&rates[i]), (unsigned long long)off, run.pulses, (unsigned long long)pulses, sent,
+                   i + 1 < COUNT_OF(rates) ? ";" : "\n");
+            exact = exact && run.pulses == pulses;
+            if (off > worst)
+                worst = off;
+            run_end(&run, &result->worst);
+        }
+    }
+    figure(result, "%llu cycles%s", (unsigned long long)worst, exact ? "" : ", counts wrong");
+    result->verdict = worst == 0 && exact ? VERDICT_MET : VERDICT_NOT_MET;
+}

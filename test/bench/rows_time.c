@@ -1,0 +1,153 @@
+/* Rows: newline to first pulse, streaming, range of periods. */
+#include "bench.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#define COUNT_OF(array) (sizeof(array) / sizeof(array)[0])
+
+static double us(uint64_t ticks)
+{
+    return (double)ticks / TICKS_PER_US;
+}
+
+void row_first_pulse(result_t *result)
+{
+    static const struct {
+        const char *what;
+        const char *lines;
+        uint8_t ustep;
+    } cases[] = {
+        {"as the manual's example", "m2000v150\n", 0},
+        {"linear", "m2000v150a10.47d10.47l1\n", 0},
+        {"truncated", "m20v150\n", 0},
+        {"linear, truncated", "m20v150l1a10d10\n", 0},
+        {"without ramps", "m2000vc3000a999d999\n", 0},
+        {"without ramps, 500 kHz", "m2000vc2a999d999\n", 0},
+        {"counter-clockwise", "m-2000v150\n", 0},
+        {"all parameters", "m-1234567v12345a12.34d56.78u200t0l1s0p\n", 0},
+        {"microsteps", "m2000v150a.5d.5\n", 4},
+        {"pulses", "m2000pv150\n", 4},
+        {"one step", "m1\n", 0},
+    };
+    static const uint64_t phases[] = {0, 1000, 2333, 7777};
+    uint64_t worst = 0;
+    const char *worst_line = "";
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
+        uint64_t most = 0;
+        uint64_t least = UINT64_MAX;
+        for (size_t p = 0; p < COUNT_OF(phases); p++) {
+            run_t run;
+            run_begin(&run, (setup_t){.ustep = cases[i].ustep, .pulse_us = 1, .baud = 38400});
+            run_for(&run, phases[p]);
+            run_type(&run, cases[i].lines);
+            run_until_pulses(&run, 1, TICKS_PER_S / 5);
+            if (run.pulses == 0)
+                die("no pulse from %s: %s", cases[i].lines, board_uart_text(run.board));
+            uint64_t wait = run.rise[0] - board_uart_last_sent(run.board);
+            if (wait > most)
+                most = wait;
+            if (wait < least)
+                least = wait;
+            run_end(&run, &result->worst);
+        }
+        detail(result, "- %s, `%.*s`: %.1f to %.1f us\n", cases[i].what, (int)strlen(cases[i].lines) - 1,
+               cases[i].lines, us(least), us(most));
+        if (most > worst) {
+            worst = most;
+            worst_line = cases[i].lines;
+        }
+    }
+    figure(result, "%.1f µs at most (`%.*s`)", us(worst), (int)strlen(worst_line) - 1, worst_line);
+    result->verdict = worst <= 150 * TICKS_PER_US ? VERDICT_MET : VERDICT_NOT_MET;
+}
+
+void row_streaming(result_t *result)
+{
+    /* Commands of `steps` at one velocity; then with velocities that change from one to the next. The first is slow
+     * enough to let the others arrive. */
+    static const struct {
+        uint32_t steps;
+        uint32_t cycle_us[6]; /* 0: no more */
+        uint8_t pulse_us;
+    } cases[] = {
+        {200, {2000, 2000, 2000, 2000}, 2}, {20000, {30, 30, 30, 30}, 2}, {50000, {10, 10, 10, 10}, 2},
+        {100000, {5, 5, 5, 5}, 2},          {200000, {2, 2, 2, 2}, 1},    {1000, {1000, 500, 1500, 30, 3000}, 2},
+        {20000, {100, 5, 40, 4, 10}, 2},    {1, {400000, 2000, 2000}, 2}, {3, {100000, 500, 700, 20000}, 2},
+    };
+    uint64_t worst = 0;
+    bool exact = true;
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
+        run_t run;
+        char text[400] = "";
+        size_t at = 0;
+        uint64_t pulses = 0;
+        size_t commands = 0;
+        for (; cases[i].cycle_us[commands]; commands++) {
+            at += (size_t)snprintf(text + at, sizeof text - at, "m%uvc%ua999d999\n", cases[i].steps,
+                                   cases[i].cycle_us[commands]);
+            pulses += cases[i].steps;
+        }
+        run_begin(&run, (setup_t){.ustep = 0, .pulse_us = cases[i].pulse_us, .baud = 250000});
+        run_type(&run, text);
+        run_until_quiet(&run, TICKS_PER_S, 60 * TICKS_PER_S);
+        uint64_t most = 0;
+        for (size_t k = 0; k + 1 < run.pulses && k < pulses; k++) {
+            uint64_t wanted = (uint64_t)cases[i].cycle_us[k / cases[i].steps] * TICKS_PER_US;
+            uint64_t got = run_interval(&run, k);
+            uint64_t off = got > wanted ? got - wanted : wanted - got;
+            if (off > most)
+                most = off;
+        }
+        bool right = run.pulses == pulses && run_faults(&run) == 0;
+        detail(result, "- %zu commands of %u steps, vc", commands, cases[i].steps);
+        for (size_t c = 0; c < commands; c++)
+            detail(result, " %u", cases[i].cycle_us[c]);
+        detail(result, ": %llu ticks, %zu of %llu pulses, faults %u\n", (unsigned long long)most, run.pulses,
+               (unsigned long long)pulses, run_faults(&run));
+        exact = exact && right;
+        if (most > worst)
+            worst = most;
+        run_end(&run, &result->worst);
+    }
+    figure(result, "%llu ticks%s", (unsigned long long)worst, exact ? "" : ", counts or faults wrong");
+    result->verdict = worst == 0 && exact ? VERDICT_MET : VERDICT_NOT_MET;
+}
+
+/* All intervals of `pulses` pulses at one period are exact. */
+static bool period_exact(result_t *result, uint32_t period_us, unsigned pulses)
+{
+    run_t run;
+    char text[80];
+    uint64_t ticks = (uint64_t)period_us * TICKS_PER_US;
+    run_begin(&run, (setup_t){.ustep = 0, .pulse_us = 1, .baud = 38400});
+    snprintf(text, sizeof text, "m%uvc%ua999d999\n", pulses, period_us);
+    run_type(&run, text);
+    run_until_pulses(&run, pulses, ticks * pulses + TICKS_PER_S);
+    run_for(&run, TICKS_PER_S / 10);
+    bool exact = run.pulses == pulses && run_faults(&run) == 0;
+    uint64_t last = 0;
+    for (size_t k = 0; k + 1 < run.pulses; k++) {
+        last = run_interval(&run, k);
+        exact = exact && last == ticks;
+    }
+    detail(result, "- vc%u: %zu of %u pulses, interval %llu of %llu ticks\n", period_us, run.pulses, pulses,
+           (unsigned long long)last, (unsigned long long)ticks);
+    run_end(&run, &result->worst);
+    return exact;
+}
+
+void row_periods(result_t *result)
+{
+    static const struct {
+        uint32_t period_us;
+        unsigned pulses;
+    } cases[] = {{2, 1000},   {3, 1000},   {5, 1000},    {6, 1000},     {7, 1000},       {2047, 50},
+                 {2048, 50},  {2049, 50},  {2056, 50},   {2057, 50},    {4095, 50},      {4096, 50},
+                 {4097, 50},  {4104, 50},  {6144, 50},   {6145, 50},    {10000019, 3},   {4294967295u, 2}};
+    bool all = true;
+    for (size_t i = 0; i < COUNT_OF(cases); i++)
+        all = period_exact(result, cases[i].period_us, cases[i].pulses) && all;
+    figure(result, all ? "2 µs to 4,294,967,295 µs, exact" : "not exact everywhere");
+    result->verdict = all ? VERDICT_MET : VERDICT_NOT_MET;
+}
