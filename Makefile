@@ -8,12 +8,17 @@ DEFS ?=
 # Budgets in bytes; what exceeds one fails the build. RAM is what is taken before the first call, the stack apart.
 FLASH_BUDGET := 26624
 RAM_BUDGET := 1400
+# V=1 shows the commands.
+V ?=
 # How many jobs build and test side by side.
 JOBS ?= $(shell nproc)
 # Flashing: the serial port; its speed is found out unless given; the programmer for flash-isp.
 PORT ?= /dev/ttyUSB0
 BAUD ?= 115200 57600
 PROGRAMMER ?= usbasp
+
+Q := $(if $(V),,@)
+say = $(if $(V),,@echo '  $(1)')
 
 # avr-gcc 5.4 is the reference: unpacked by tools/setup.sh where the system's own is another one.
 AVR ?= $(if $(wildcard .tools/avr-5.4/ready),.tools/avr-5.4/usr/bin/avr-,avr-)
@@ -113,13 +118,16 @@ $(BUILD)/firmware/flags: FORCE
 
 $(BUILD)/firmware/%.o: firmware/% $(BUILD)/firmware/flags
 	@mkdir -p $(@D)
-	$(AVR)gcc $(AVR_CFLAGS) $(DEFS) -MMD -MP -c -o $@ $<
+	$(call say,CC  $@)
+	$(Q)$(AVR)gcc $(AVR_CFLAGS) $(DEFS) -MMD -MP -c -o $@ $<
 
 $(BUILD)/sac.elf: $(FIRMWARE_OBJS) $(BUILD)/firmware/flags
-	$(AVR)gcc $(AVR_LDFLAGS) -Wl,-Map=$(BUILD)/sac.map -o $@ $(FIRMWARE_OBJS) -lm
+	$(call say,LD  $@)
+	$(Q)$(AVR)gcc $(AVR_LDFLAGS) -Wl,-Map=$(BUILD)/sac.map -o $@ $(FIRMWARE_OBJS) -lm
 
 $(BUILD)/sac.hex: $(BUILD)/sac.elf
-	$(AVR)objcopy -O ihex -j .text -j .data $< $@
+	$(call say,HEX $@)
+	$(Q)$(AVR)objcopy -O ihex -j .text -j .data $< $@
 
 .PHONY: budgets
 budgets: $(BUILD)/sac.elf
@@ -149,27 +157,32 @@ BOARD_LIB := $(BUILD)/libboard.a
 
 $(BOARD_OBJS): $(BUILD)/%.o: %.c $(HOST_HEADERS) Makefile
 	@mkdir -p $(@D)
-	$(HOST_CC) $(HOST_CFLAGS) -O2 $(BOARD_CFLAGS) -Itest/board -c -o $@ $<
+	$(call say,CC  $@)
+	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O2 $(BOARD_CFLAGS) -Itest/board -c -o $@ $<
 
 $(BOARD_LIB): $(BOARD_OBJS)
 	@rm -f $@
-	ar rcs $@ $^
+	$(call say,AR  $@)
+	$(Q)ar rcs $@ $^
 
 SACSIM_OBJS := $(SACSIM_SRCS:%.c=$(BUILD)/%.o)
 
 $(SACSIM_OBJS): $(BUILD)/%.o: %.c $(HOST_HEADERS) Makefile
 	@mkdir -p $(@D)
-	$(HOST_CC) $(HOST_CFLAGS) -O2 $(SACSIM_CPPFLAGS) -c -o $@ $<
+	$(call say,CC  $@)
+	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O2 $(SACSIM_CPPFLAGS) -c -o $@ $<
 
 $(BUILD)/sacsim: $(SACSIM_OBJS) $(BOARD_LIB)
-	$(HOST_CC) $(BOARD_LDFLAGS) -o $@ $^ $(BOARD_LIBS) $(SACSIM_LDLIBS)
+	$(call say,LD  $@)
+	$(Q)$(HOST_CC) $(BOARD_LDFLAGS) -o $@ $^ $(BOARD_LIBS) $(SACSIM_LDLIBS)
 
 .PHONY: sim
 sim: $(BUILD)/sacsim $(BUILD)/sac.elf ## type at a simulated Nano; SIM='--help' lists its options
 	@$(BUILD)/sacsim $(SIM) $(BUILD)/sac.elf
 
 $(BUILD)/bench: test/bench/bench.c $(BOARD_LIB) $(HOST_HEADERS)
-	$(HOST_CC) $(HOST_CFLAGS) -O2 -Itest/board -Ifirmware $(BOARD_LDFLAGS) -o $@ $(filter %.c %.a,$^) $(BOARD_LIBS) -lm
+	$(call say,LD  $@)
+	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O2 -Itest/board -Ifirmware $(BOARD_LDFLAGS) -o $@ $(filter %.c %.a,$^) $(BOARD_LIBS) -lm
 
 .PHONY: bench
 bench: $(BUILD)/bench $(BUILD)/sac.elf ## measure the image on the board; writes docs/benchmark.md
@@ -190,42 +203,50 @@ IMAGE_BINS := $(IMAGE_TESTS:%=$(BUILD)/image/%)
 
 $(BUILD)/unity.o: $(UNITY)/unity.c
 	@mkdir -p $(@D)
-	$(HOST_CC) -O2 -g $(UNITY_FLAGS) -c -o $@ $<
+	$(call say,CC  $@)
+	$(Q)$(HOST_CC) -O2 -g $(UNITY_FLAGS) -c -o $@ $<
 
 $(BUILD)/unity-sanitized.o: $(UNITY)/unity.c
 	@mkdir -p $(@D)
-	$(HOST_CC) -O1 -g $(UNITY_FLAGS) $(SANITIZE) -c -o $@ $<
+	$(call say,CC  $@)
+	$(Q)$(HOST_CC) -O1 -g $(UNITY_FLAGS) $(SANITIZE) -c -o $@ $<
 
 .SECONDEXPANSION:
 $(HOST_BINS): $(BUILD)/host/%: test/host/%.c $$($$*_SRCS) $(BUILD)/unity-sanitized.o $(HOST_HEADERS) Makefile
 	@mkdir -p $(@D)
-	$(HOST_CC) $(HOST_CFLAGS) -O1 $(UNITY_FLAGS) $(SANITIZE) $(TEST_INCLUDES) -o $@ $(filter %.c %.o,$^) -lm
+	$(call say,CC  $@)
+	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O1 $(UNITY_FLAGS) $(SANITIZE) $(TEST_INCLUDES) -o $@ $(filter %.c %.o,$^) -lm
 
 # Unity reports over the serial port; the runner passes on what it says. -UAVR: Unity 2.5 would put its words into flash
 # and read them from RAM.
 $(AVR_IMAGES): $(BUILD)/avr/%.elf: test/host/%.c $$($$*_SRCS) test/avr/report.c $(HOST_HEADERS) Makefile
 	@mkdir -p $(@D)
-	$(AVR)gcc $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 -Os -g -mcall-prologues -fshort-enums -ffunction-sections -fdata-sections \
+	$(call say,CC  $@)
+	$(Q)$(AVR)gcc $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 -Os -g -fshort-enums -ffunction-sections -fdata-sections \
 	    -Wl,--gc-sections -UAVR -include test/avr/report.h -DUNITY_EXCLUDE_FLOAT $(TEST_INCLUDES) -o $@ \
 	    $(filter %.c,$^) $(UNITY)/unity.c
 
 $(BUILD)/avr/run: test/avr/run.c $(BOARD_LIB) $(HOST_HEADERS)
 	@mkdir -p $(@D)
-	$(HOST_CC) $(HOST_CFLAGS) -O2 -Itest/board $(BOARD_LDFLAGS) -o $@ $(filter %.c %.a,$^) $(BOARD_LIBS)
+	$(call say,LD  $@)
+	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O2 -Itest/board $(BOARD_LDFLAGS) -o $@ $(filter %.c %.a,$^) $(BOARD_LIBS)
 
 $(BOARD_IMAGES): $(BUILD)/board/programs/%.elf: $$(wildcard test/board/programs/$$*.[cS])
 	@mkdir -p $(@D)
-	$(AVR)gcc $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 -Os -g -mcall-prologues -Wall -Wextra -Werror -o $@ $<
+	$(call say,CC  $@)
+	$(Q)$(AVR)gcc $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 -Os -g -Wall -Wextra -Werror -o $@ $<
 
 $(BOARD_BINS): $(BUILD)/board/%: test/board/%.c $(BUILD)/unity.o $(BOARD_LIB) $(HOST_HEADERS)
 	@mkdir -p $(@D)
-	$(HOST_CC) $(HOST_CFLAGS) -O2 $(UNITY_FLAGS) $(TEST_INCLUDES) $(TEST_PATHS) -Itest/board $(BOARD_LDFLAGS) -o $@ \
+	$(call say,LD  $@)
+	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O2 $(UNITY_FLAGS) $(TEST_INCLUDES) $(TEST_PATHS) -Itest/board $(BOARD_LDFLAGS) -o $@ \
 	    $(filter %.c %.o %.a,$^) $(BOARD_LIBS) -lm
 
 $(IMAGE_BINS): $(BUILD)/image/%: test/image/%.c $(IMAGE_COMMON_SRCS) $$($$*_SRCS) $(BUILD)/unity.o $(BOARD_LIB) \
     $(HOST_HEADERS)
 	@mkdir -p $(@D)
-	$(HOST_CC) $(HOST_CFLAGS) -O2 $(UNITY_FLAGS) $(TEST_INCLUDES) $(TEST_PATHS) -Itest/board $(BOARD_LDFLAGS) -o $@ \
+	$(call say,LD  $@)
+	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O2 $(UNITY_FLAGS) $(TEST_INCLUDES) $(TEST_PATHS) -Itest/board $(BOARD_LDFLAGS) -o $@ \
 	    $(filter %.c %.o %.a,$^) $(BOARD_LIBS) -lm
 
 HOST_PARTS := $(HOST_BINS)
