@@ -255,7 +255,7 @@ status_t display_request(display_t display)
         return STATUS_OK;
     }
     if (waiting_count == DISPLAY_WAITING) {
-        return STATUS_OUTPUT_BUSY;
+        return STATUS_BUSY;
     }
     waiting[waiting_count++] = display;
     return STATUS_OK;

@@ -4,7 +4,7 @@
  * display shows of the session and the time is that of the moment it begins; the queue is read row by row.
  * Every row ends with CR LF; the prompt is the terminal's business.
  * Context: main loop. Cost: one piece, at most 24 characters, each call.
- * Errors:  STATUS_OUTPUT_BUSY: too many are waiting; this one is not taken.
+ * Errors:  STATUS_BUSY: too many are waiting; this one is not taken.
  * Tests:   test/host/test_display.c
  * Source:  requirements, annex E (queue); manual lines 286, 624, 929-935. */
 #ifndef CLI_DISPLAY_H

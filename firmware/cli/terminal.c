@@ -87,6 +87,7 @@ static NOINLINE bool pay(void)
     if (owed_status != STATUS_OK) {
         put_error(owed_status);
         owed_status = STATUS_OK;
+        return true;
     }
     text_put_flash(prompt);
     behind = false;

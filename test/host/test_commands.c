@@ -327,7 +327,7 @@ static void test_too_many_displays_at_once_are_refused(void)
     for (int i = 0; i < 1 + DISPLAY_WAITING; i++) {
         TEST_ASSERT_EQUAL(STATUS_OK, execute("vd"));
     }
-    TEST_ASSERT_EQUAL(STATUS_OUTPUT_BUSY, execute("q"));
+    TEST_ASSERT_EQUAL(STATUS_BUSY, execute("q"));
     finish_displays();
     TEST_ASSERT_EQUAL(STATUS_OK, execute("q"));
 }

@@ -211,7 +211,7 @@ static void test_one_display_too_many_is_refused(void)
         terminal_port_fake_drain(1);
     }
     const char *text = terminal_port_fake_text();
-    TEST_ASSERT_NOT_NULL(strstr(text, "10 30000\r\n10 30000\r\n10 30000\r\n10 30000\r\n?13 output busy\r\nSAC>"));
+    TEST_ASSERT_NOT_NULL(strstr(text, "10 30000\r\n10 30000\r\n10 30000\r\n10 30000\r\n?11 busy\r\nSAC>"));
 }
 
 /* STO-001 */
