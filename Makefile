@@ -91,10 +91,11 @@ CHECKS := \
     --check pins='$(PYTHON) tools/check_pins.py' \
     --check budgets='$(MAKE) -s --no-print-directory budgets'
 
-# The board, its models and the simulator program list their own sources.
+# The board, its models, the simulator program and the benchmark list their own sources.
 -include test/board/board.mk
 -include test/board/models.mk
 -include tools/sacsim/sacsim.mk
+-include test/bench/bench.mk
 
 # -- firmware --------------------------------------------------------------------------------------------------------
 
@@ -180,13 +181,14 @@ $(BUILD)/sacsim: $(SACSIM_OBJS) $(BOARD_LIB)
 sim: $(BUILD)/sacsim $(BUILD)/sac.elf ## type at a simulated Nano; SIM='--help' lists its options
 	@$(BUILD)/sacsim $(SIM) $(BUILD)/sac.elf
 
-$(BUILD)/bench: test/bench/bench.c $(BOARD_LIB) $(HOST_HEADERS)
+$(BUILD)/bench: $(BENCH_SRCS) $(BOARD_LIB) $(HOST_HEADERS)
 	$(call say,LD  $@)
 	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O2 -Itest/board -Ifirmware $(BOARD_LDFLAGS) -o $@ $(filter %.c %.a,$^) $(BOARD_LIBS) -lm
 
 .PHONY: bench
 bench: $(BUILD)/bench $(BUILD)/sac.elf ## measure the image on the board; writes docs/benchmark.md
-	@$(BUILD)/bench $(BUILD)/sac.elf
+	@$(PYTHON) tools/check_stack.py $(BUILD)/sac.elf --su $(BUILD)/firmware --prefix $(AVR) >$(BUILD)/stack.txt || true
+	@$(BUILD)/bench --stack $(BUILD)/stack.txt --markdown docs/benchmark.md $(BUILD)/sac.elf $(BENCH)
 
 # -- tests -----------------------------------------------------------------------------------------------------------
 
