@@ -18,7 +18,7 @@ BAUD ?= 115200 57600
 PROGRAMMER ?= usbasp
 
 Q := $(if $(V),,@)
-say = $(if $(V),,@echo '  $(1)')
+say = $(if $(V)$(findstring s,$(firstword -$(MAKEFLAGS))),,@echo '  $(1)')
 
 # avr-gcc 5.4 is the reference: unpacked by tools/setup.sh where the system's own is another one.
 AVR ?= $(if $(wildcard .tools/avr-5.4/ready),.tools/avr-5.4/usr/bin/avr-,avr-)
@@ -261,7 +261,7 @@ AVR_PARTS := $(if $(AVR_TESTS),$(AVR_IMAGES) $(BUILD)/avr/run)
 test-parts: $(HOST_PARTS) $(BOARD_PARTS) $(IMAGE_PARTS) $(AVR_PARTS) $(SIM_PARTS)
 
 # Building goes on after an error; that it failed counts as a failed check, and the runner has the last word.
-build_then_run = built=true; $(MAKE) -s -k -j$(JOBS) --no-print-directory $(1) || built=false; \
+build_then_run = echo 'building'; built=true; $(MAKE) -s -k -j$(JOBS) --no-print-directory $(1) || built=false; \
     $(PYTHON) tools/run_tests.py --jobs $(JOBS) --check build=$$built --results $(BUILD)/$(2)
 test_runs = $(foreach run,$(1),--tests $(run))
 AVR_RUNS = $(foreach run,$(AVR_TESTS),--tests '$(BUILD)/avr/run $(BUILD)/avr/$(run).elf')
