@@ -51,7 +51,8 @@ extern const char *bench_elf;          /* the image */
 extern const char *bench_stack_report; /* what tools/check_stack.py printed; NULL: not given */
 
 void row_cruise_rate(result_t *result);
-void row_ramp_rate(result_t *result);
+void row_harmonic_rate(result_t *result);
+void row_linear_rate(result_t *result);
 void row_load_cruise(result_t *result);
 void row_load_ramps(result_t *result);
 void row_jitter(result_t *result);
@@ -61,6 +62,7 @@ void row_streaming(result_t *result);
 void row_periods(result_t *result);
 void row_memory(result_t *result);
 void row_isr_paths(result_t *result);
+void row_masked(result_t *result);
 
 /* -- one run of the image (run.c) -------------------------------------------------------------------------------- */
 
@@ -83,9 +85,9 @@ typedef struct {
     size_t pulses;
     size_t room;
     uint64_t last_rise;
-    size_t bad_widths;   /* pulses that are not setup.pulse_us long */
+    size_t bad_widths; /* pulses that are not setup.pulse_us long */
     flood_t flood;
-    uint64_t fed_until;  /* cycle until which what has been given to the peer will last */
+    uint64_t fed_until; /* cycle until which what has been given to the peer will last */
     size_t fed_lines;
     worst_t worst;
 } run_t;
@@ -109,8 +111,8 @@ bool run_until_pulses(run_t *run, size_t pulses, uint64_t limit);
 void run_measures_clear(run_t *run);
 const board_measures_t *run_measures(run_t *run);
 
-uint8_t run_faults(run_t *run); /* the engine's fault bits (engine.h) */
-int32_t run_position(run_t *run); /* in standstill */
+uint8_t run_faults(run_t *run);                    /* the engine's fault bits (engine.h) */
+int32_t run_position(run_t *run);                  /* in standstill */
 uint64_t run_interval(const run_t *run, size_t k); /* between pulse k and k + 1 */
 
 void die(const char *format, ...) __attribute__((noreturn, format(printf, 1, 2)));
