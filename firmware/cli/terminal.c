@@ -32,6 +32,7 @@ static const char *owed_range; /* of that error */
 
 /* Debug mode: how long the last line took. */
 static bool owes_times;
+static bool timing;          /* this line is being timed: not while the times of the last one are owed */
 static uint32_t received_us; /* while a line is typed: when it began */
 static uint32_t loaded_us;
 
@@ -150,7 +151,7 @@ static NOINLINE void note_loaded(void)
 
 static NOINLINE void end_line(void)
 {
-    const bool timed = commands_debugging() && !owes_times && !line_is_blank(&line);
+    const bool timed = timing && !line_is_blank(&line);
     if (timed) {
         note_received();
     }
@@ -172,7 +173,8 @@ static NOINLINE bool begin_line(uint8_t byte)
     if (commands_at_once((char)byte)) {
         return false;
     }
-    if (commands_debugging() && !owes_times) {
+    timing = commands_debugging() && !owes_times;
+    if (timing) {
         received_us = timebase_us();
     }
     return true;
@@ -185,6 +187,7 @@ void terminal_init(void)
     behind = false;
     owes_new_line = false;
     owes_times = false;
+    timing = false;
     owed_status = STATUS_OK;
     display_init();
     text_put_flash(version_line);

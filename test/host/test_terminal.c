@@ -32,9 +32,7 @@ void setUp(void)
     terminal_port_fake_clear();
 }
 
-void tearDown(void)
-{
-}
+void tearDown(void) {}
 
 /* What comes back when this is typed, each character in its time, and everything has been said. */
 static const char *answer(const char *text)
@@ -95,7 +93,8 @@ static void test_a_blank_line_repeats_the_prompt_once(void)
 
 static void test_taking_a_character_back_removes_it_from_the_screen_and_the_command(void)
 {
-    TEST_ASSERT_EQUAL_STRING("m201\b \b\b \b50\r\nSAC>", answer("m201\b\x7F""50\r"));
+    TEST_ASSERT_EQUAL_STRING("m201\b \b\b \b50\r\nSAC>", answer("m201\b\x7F"
+                                                                "50\r"));
     TEST_ASSERT_EQUAL_UINT32(250, engine_fake.submitted[0].count);
     TEST_ASSERT_EQUAL_STRING("", answer("\b\b"));
 }
@@ -320,6 +319,19 @@ static void test_debug_reports_how_long_each_line_took(void)
     TEST_ASSERT_EQUAL_STRING("m200\r\nSAC>", answer("m200\r"));
 }
 
+static void test_a_line_begun_while_the_last_times_are_owed_is_not_timed(void)
+{
+    answer("b\r");
+    timebase_fake_step_us = 100;
+    terminal_port_fake_type("q\r");
+    terminal_poll();
+    terminal_port_fake_type("k");
+    run();
+    TEST_ASSERT_NOT_NULL(strstr(terminal_port_fake_text(), "received 100 us, loaded 100 us\r\nSAC>k"));
+    TEST_ASSERT_EQUAL_STRING("\r\n?1 unknown command\r\nSAC>", answer("\r"));
+    TEST_ASSERT_EQUAL_STRING("k\r\nreceived 100 us, loaded 100 us\r\n?1 unknown command\r\nSAC>", answer("k\r"));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -346,5 +358,6 @@ int main(void)
     RUN_TEST(test_output_rests_while_much_input_waits);
     RUN_TEST(test_echo_of_a_flood_is_thinned_out_by_whole_lines);
     RUN_TEST(test_debug_reports_how_long_each_line_took);
+    RUN_TEST(test_a_line_begun_while_the_last_times_are_owed_is_not_timed);
     return UNITY_END();
 }
