@@ -78,9 +78,9 @@ test_terminal_SRCS := $(CLI_SRCS) firmware/cli/terminal.c firmware/cli/line.c fi
 AVR_TESTS := test_number
 
 # Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
-IMAGE_TESTS :=
+IMAGE_TESTS := test_image_motion
 # What every whole-image test is linked with.
-IMAGE_COMMON_SRCS :=
+IMAGE_COMMON_SRCS := test/image/image.c test/image/model.c
 
 # Tests written in Python.
 SCRIPT_TESTS := test/tools/test_tools.py test/sim/test_sacsim.py
