@@ -15,26 +15,18 @@ typedef struct {
     bool u2x;      /* 8 samples a bit instead of 16 */
 } baud_divisor_t;
 
-static inline uint32_t baud_error(uint32_t baud, uint8_t samples, uint16_t divisor)
-{
-    const uint32_t real = (uint32_t)BOARD_CPU_HZ / samples / divisor;
-    return real > baud ? real - baud : baud - real;
-}
-
-static inline uint16_t baud_nearest(uint32_t baud, uint8_t samples)
-{
-    const uint32_t clocks = (uint32_t)BOARD_CPU_HZ / samples;
-    const uint32_t divisor = (clocks + baud / 2) / baud;
-    return divisor < 1 ? 1 : divisor > 4096 ? 4096 : (uint16_t)divisor;
-}
-
-/* The closer of the two modes; if they are equal, 16 samples a bit, which tolerate more. baud: >= 1. */
+/* Counted in eighths of a bit, an even divisor is the same rate with 16 samples a bit, which tolerate more; only an odd
+ * one needs 8 samples. baud: >= 1. */
 static inline baud_divisor_t baud_divisor(uint32_t baud)
 {
-    const uint16_t normal = baud_nearest(baud, 16);
-    const uint16_t twice = baud_nearest(baud, 8);
-    const bool u2x = baud_error(baud, 8, twice) < baud_error(baud, 16, normal);
-    return (baud_divisor_t){.ubrr = (uint16_t)((u2x ? twice : normal) - 1), .u2x = u2x};
+    const uint32_t eighths = ((uint32_t)BOARD_CPU_HZ / 8 + baud / 2) / baud;
+    if (eighths == 0) {
+        return (baud_divisor_t){.ubrr = 0, .u2x = true};
+    }
+    if ((eighths & 1) != 0 && eighths <= 4096) {
+        return (baud_divisor_t){.ubrr = (uint16_t)(eighths - 1), .u2x = true};
+    }
+    return (baud_divisor_t){.ubrr = eighths > 8192 ? 4095 : (uint16_t)(eighths / 2 - 1), .u2x = false};
 }
 
 #endif
