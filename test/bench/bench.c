@@ -120,7 +120,9 @@ void row_memory(result_t *result)
         if (file && fgets(report, sizeof report, file)) {
             report[strcspn(report, "\n")] = '\0';
             detail(result, "- %s\n", report);
-            proven = strncmp(report, "stack", 5) == 0;
+            unsigned bound;
+            unsigned left;
+            proven = sscanf(report, "stack %u of %u", &bound, &left) == 2 && bound <= left;
         }
         if (file)
             fclose(file);

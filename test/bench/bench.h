@@ -111,8 +111,13 @@ bool run_until_pulses(run_t *run, size_t pulses, uint64_t limit);
 void run_measures_clear(run_t *run);
 const board_measures_t *run_measures(run_t *run);
 
-uint8_t run_faults(run_t *run);                    /* the engine's fault bits (engine.h) */
-int32_t run_position(run_t *run);                  /* in standstill */
+/* In standstill: what the command p answers. Ends a flood. */
+typedef struct {
+    int position;
+    unsigned faults; /* engine.h */
+} report_t;
+report_t run_report(run_t *run);
+
 uint64_t run_interval(const run_t *run, size_t k); /* between pulse k and k + 1 */
 
 void die(const char *format, ...) __attribute__((noreturn, format(printf, 1, 2)));
@@ -155,11 +160,14 @@ typedef struct {
     double worst_ticks_percent; /* largest error of those beyond one tick, in % */
     double beyond_rms_percent;  /* rms of what exceeds one tick */
     uint64_t worst_at;          /* interval with max_percent */
+    uint64_t first_bad;         /* first interval that is off by more than 0.1 % and a tick; UINT64_MAX: none */
     double sum_ticks;           /* error of the sum of all intervals, cruise included */
 } ramp_error_t;
 
 /* Compares the run's pulses from `first` on with the ideal; the closing interval is not seen. */
 void ideal_compare(const ideal_t *ideal, const run_t *run, size_t first, ramp_error_t *error);
+/* Where the first interval out of the target is: its number and speed. */
+void ramp_error_where(const ramp_error_t *error, const ideal_t *ideal, char *text, size_t size);
 /* Within the target: 0.03 % rms and 0.1 % at most, where that is more than a tick. */
 bool ramp_error_met(const ramp_error_t *error);
 

@@ -93,12 +93,21 @@ void ideal_command(const motion_t *motion, char *text, size_t size)
              motion->decel, motion->linear);
 }
 
+void ramp_error_where(const ramp_error_t *error, const ideal_t *ideal, char *text, size_t size)
+{
+    if (error->first_bad == UINT64_MAX)
+        snprintf(text, size, "none");
+    else
+        snprintf(text, size, "%llu, %.2f kHz", (unsigned long long)error->first_bad,
+                 (double)(TICKS_PER_S / ideal_interval(ideal, error->first_bad) / 1000.0L));
+}
+
 void ideal_compare(const ideal_t *ideal, const run_t *run, size_t first, ramp_error_t *error)
 {
     long double squares = 0.0L;
     long double beyond = 0.0L;
     long double sum = 0.0L;
-    *error = (ramp_error_t){.intervals = 0};
+    *error = (ramp_error_t){.first_bad = UINT64_MAX};
     uint64_t seen = run->pulses - first;
     if (seen > ideal_pulses(ideal))
         seen = ideal_pulses(ideal);
@@ -118,6 +127,8 @@ void ideal_compare(const ideal_t *ideal, const run_t *run, size_t first, ramp_er
         if (fabsl(off) > (long double)error->max_ticks)
             error->max_ticks = (double)fabsl(off);
         if (fabsl(off) > 1.0L) {
+            if (percent > 0.1L && error->first_bad == UINT64_MAX)
+                error->first_bad = k;
             if (percent > (long double)error->worst_ticks_percent)
                 error->worst_ticks_percent = (double)percent;
             long double excess = 100.0L * (fabsl(off) - 1.0L) / ideal_ticks;

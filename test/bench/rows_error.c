@@ -19,21 +19,24 @@ static void measure(result_t *result, const motion_t *motion, ramp_error_t *erro
     run_until_pulses(&run, ideal_pulses(&ideal), 120 * TICKS_PER_S);
     run_for(&run, TICKS_PER_S / 10);
     ideal_compare(&ideal, &run, 0, error);
-    *exact = run.pulses == ideal_pulses(&ideal) && run_faults(&run) == 0;
+    report_t report = run_report(&run);
+    *exact = run.pulses == ideal_pulses(&ideal) && report.position == (int)run.pulses && report.faults == 0;
     double first = 100.0 * ((double)(run_interval(&run, 0) / ideal_interval(&ideal, 0)) - 1.0);
     char line[80];
     snprintf(line, sizeof line, "%.*s", (int)sizeof line - 1, text);
     for (char *c = line; *c; c++)
         if (*c == '\n')
             *c = '\0';
+    char where[60];
     char wrong[80] = "";
+    ramp_error_where(error, &ideal, where, sizeof where);
     if (!*exact)
         snprintf(wrong, sizeof wrong, "%+lld pulses, faults %u",
-                 (long long)run.pulses - (long long)ideal_pulses(&ideal), run_faults(&run));
-    detail(result, "| `%s`%s | %g kHz | %+.4f | %.4f | %.4f at %llu | %.2f | %.4f | %.4f | %+.1f | %s |\n", line,
+                 (long long)run.pulses - (long long)ideal_pulses(&ideal), report.faults);
+    detail(result, "| `%s`%s | %g kHz | %+.4f | %.4f | %.4f at %llu | %.2f | %.4f | %.4f | %s | %+.1f | %s |\n", line,
            motion->ustep ? " (microsteps)" : "", 1000.0 / motion->cycle_us * (1 << motion->ustep), first,
            error->rms_percent, error->max_percent, (unsigned long long)error->worst_at, error->max_ticks,
-           error->worst_ticks_percent, error->beyond_rms_percent, error->sum_ticks, wrong);
+           error->worst_ticks_percent, error->beyond_rms_percent, where, error->sum_ticks, wrong);
     run_end(&run, &result->worst);
 }
 
@@ -69,7 +72,7 @@ void row_ramp_error(result_t *result)
     };
     static const char heading[] =
         "\n| %s | to | first interval %% | rms %% | max %% at interval | max ticks | max %% beyond a tick | rms %% of what "
-        "is beyond a tick | sum, ticks | |\n|---|---|---|---|---|---|---|---|---|---|\n";
+        "is beyond a tick | first out of the target | sum, ticks | |\n|---|---|---|---|---|---|---|---|---|---|---|\n";
     bool met = true;
     double rms = 0.0;
     double beyond_rms = 0.0;

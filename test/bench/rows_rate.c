@@ -47,15 +47,15 @@ void row_cruise_rate(result_t *result)
         run_type(&run, text);
         run_until_quiet(&run, TICKS_PER_S / 2, 60 * TICKS_PER_S);
         uint64_t off = grid_error(&run, rate_ticks(&rates[i]));
-        uint8_t faults = run_faults(&run);
-        bool kept = run.pulses == pulses && off == 0 && run.bad_widths == 0 && faults == 0 &&
-                    run_position(&run) == (int32_t)pulses;
+        report_t report = run_report(&run);
+        bool kept = run.pulses == pulses && off == 0 && run.bad_widths == 0 && report.faults == 0 &&
+                    report.position == (int)pulses;
         if (!kept)
             detail(result,
                    "- %g kHz: %zu of %llu pulses, %llu ticks off the grid, %zu pulses of a wrong length, faults %u, "
                    "position %d\n",
                    rate_khz(&rates[i]), run.pulses, (unsigned long long)pulses, (unsigned long long)off, run.bad_widths,
-                   faults, run_position(&run));
+                   report.faults, report.position);
         run_end(&run, &result->worst);
         if (kept) {
             figure(result, "%g kHz, %llu of %llu pulses, every interval exact", rate_khz(&rates[i]),
@@ -89,22 +89,20 @@ static bool ramps_kept(result_t *result, const rate_t *rate, bool linear)
     run_flood(&run, FLOOD_ANSWERED);
     run_until_pulses(&run, ideal_pulses(&ideal), 120 * TICKS_PER_S);
     run_until_quiet(&run, TICKS_PER_S / 2, 5 * TICKS_PER_S);
-    run_flood(&run, FLOOD_NONE);
-    run_for(&run, TICKS_PER_S / 10);
     ideal_compare(&ideal, &run, 0, &error);
-    size_t echoed;
-    board_uart_received(run.board, &echoed);
-    uint8_t faults = run_faults(&run);
+    report_t report = run_report(&run);
+    char where[60];
+    ramp_error_where(&error, &ideal, where, sizeof where);
     uint32_t overruns = board_uart_overruns(run.board);
-    bool kept = run.pulses == ideal_pulses(&ideal) && run_position(&run) == (int32_t)run.pulses && faults == 0 &&
+    bool kept = run.pulses == ideal_pulses(&ideal) && report.position == (int)run.pulses && report.faults == 0 &&
                 overruns == 0 && run.bad_widths == 0;
     detail(
         result,
         "- %s to %g kHz: %zu of %llu pulses, position %d, faults %u, %zu lines received, %u bytes lost; error %.4f %% rms, "
-        "%.3f ticks max, %.4f %% max beyond a tick (at %llu), sum %+.1f ticks\n",
+        "%.3f ticks max, %.4f %% max beyond a tick, first out of the target: %s; sum %+.1f ticks\n",
         linear ? "linear" : "harmonic", rate_khz(rate), run.pulses, (unsigned long long)ideal_pulses(&ideal),
-        run_position(&run), faults, run.fed_lines, overruns, error.rms_percent, error.max_ticks,
-        error.worst_ticks_percent, (unsigned long long)error.worst_at, error.sum_ticks);
+        report.position, report.faults, run.fed_lines, overruns, error.rms_percent, error.max_ticks,
+        error.worst_ticks_percent, where, error.sum_ticks);
     run_end(&run, &result->worst);
     return kept;
 }
@@ -155,10 +153,12 @@ void row_jitter(result_t *result)
             uint64_t off = grid_error(&run, rate_ticks(&rates[i]));
             size_t sent;
             board_uart_received(run.board, &sent);
-            detail(result, " %g kHz %llu cycles (%zu of %llu pulses, faults %u, %zu bytes echoed and answered)%s",
-                   rate_khz(&rates[i]), (unsigned long long)off, run.pulses, (unsigned long long)pulses,
-                   run_faults(&run), sent, i + 1 < COUNT_OF(rates) ? ";" : "\n");
-            exact = exact && run.pulses == pulses;
+            report_t report = run_report(&run);
+            detail(result,
+                   " %g kHz %llu cycles (%zu of %llu pulses, faults %u, %zu bytes echoed and answered, %u lost)%s",
+                   rate_khz(&rates[i]), (unsigned long long)off, run.pulses, (unsigned long long)pulses, report.faults,
+                   sent, i + 1 < COUNT_OF(rates) ? ";" : "\n");
+            exact = exact && run.pulses == pulses && report.position == (int)pulses && report.faults == 0;
             if (off > worst)
                 worst = off;
             run_end(&run, &result->worst);

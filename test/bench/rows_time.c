@@ -112,12 +112,13 @@ void row_streaming(result_t *result)
             if (off > most)
                 most = off;
         }
-        bool right = run.pulses == pulses && run_faults(&run) == 0;
+        report_t report = run_report(&run);
+        bool right = run.pulses == pulses && report.position == (int)pulses && report.faults == 0;
         detail(result, "- %zu commands of %u steps, vc", commands, cases[i].steps);
         for (size_t c = 0; c < commands; c++)
             detail(result, " %u", cases[i].cycle_us[c]);
         detail(result, ": %llu ticks, %zu of %llu pulses, faults %u\n", (unsigned long long)most, run.pulses,
-               (unsigned long long)pulses, run_faults(&run));
+               (unsigned long long)pulses, report.faults);
         exact = exact && right;
         if (most > worst)
             worst = most;
@@ -138,7 +139,8 @@ static bool period_exact(result_t *result, uint32_t period_us, unsigned pulses)
     run_type(&run, text);
     run_until_pulses(&run, pulses, ticks * pulses + TICKS_PER_S);
     run_for(&run, TICKS_PER_S / 10);
-    bool exact = run.pulses == pulses && run_faults(&run) == 0;
+    report_t report = run_report(&run);
+    bool exact = run.pulses == pulses && report.position == (int)pulses && report.faults == 0;
     uint64_t last = 0;
     for (size_t k = 0; k + 1 < run.pulses; k++) {
         last = run_interval(&run, k);

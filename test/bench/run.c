@@ -185,15 +185,18 @@ bool run_until_pulses(run_t *run, size_t pulses, uint64_t limit)
     return run->pulses >= pulses;
 }
 
-uint8_t run_faults(run_t *run)
+report_t run_report(run_t *run)
 {
-    uint8_t late = board_peek8(run->board, symbol(run, "step_late")) ? 2 : 0;
-    return board_peek8(run->board, symbol(run, "faults")) | late;
-}
-
-int32_t run_position(run_t *run)
-{
-    return (int32_t)board_peek32(run->board, symbol(run, "position"));
+    report_t report;
+    run->flood = FLOOD_NONE;
+    run_for(run, TICKS_PER_S / 10);
+    board_uart_clear(run->board);
+    run_type(run, "\np\n");
+    run_for(run, TICKS_PER_S / 10);
+    const char *text = strstr(board_uart_text(run->board), "position ");
+    if (!text || sscanf(text, "position %d %*s faults %u", &report.position, &report.faults) != 2)
+        die("no position in \"%s\"", board_uart_text(run->board));
+    return report;
 }
 
 uint64_t run_interval(const run_t *run, size_t k)
