@@ -157,7 +157,7 @@ void row_jitter(result_t *result)
             detail(result,
                    " %g kHz %llu cycles (%zu of %llu pulses, faults %u, %zu bytes echoed and answered, %u lost)%s",
                    rate_khz(&rates[i]), (unsigned long long)off, run.pulses, (unsigned long long)pulses, report.faults,
-                   sent, i + 1 < COUNT_OF(rates) ? ";" : "\n");
+                   sent, board_uart_overruns(run.board), i + 1 < COUNT_OF(rates) ? ";" : "\n");
             exact = exact && run.pulses == pulses && report.position == (int)pulses && report.faults == 0;
             if (off > worst)
                 worst = off;
