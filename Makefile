@@ -37,6 +37,7 @@ FIRMWARE_SRCS := \
     firmware/base/wide.S \
     firmware/base/status.c \
     firmware/motion/ramp.c \
+    firmware/motion/ramp_step.S \
     firmware/motion/profile.c \
     firmware/motion/engine.c \
     firmware/queue/queue.c \
@@ -75,7 +76,7 @@ test_display_SRCS := $(CLI_SRCS)
 test_terminal_SRCS := $(CLI_SRCS) firmware/cli/terminal.c firmware/cli/line.c firmware/base/status.c
 
 # Arithmetic that is tested on the AVR as well: the same source, compiled by avr-gcc, run on the simulated board.
-AVR_TESTS := test_number
+AVR_TESTS := test_number test_line test_session
 
 # Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
 IMAGE_TESTS := test_image_motion

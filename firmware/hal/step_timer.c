@@ -200,7 +200,7 @@ bool step_port_drop_after(uint8_t offset)
     return done;
 }
 
-void step_port_shorten(uint8_t offset, uint16_t periods)
+uint16_t step_port_shorten(uint8_t offset, uint16_t periods)
 {
     segment_t *s = segment_at(offset);
     uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
@@ -227,10 +227,13 @@ void step_port_shorten(uint8_t offset, uint16_t periods)
         s->count_low = (uint8_t)counted;
         s->count_high = (uint8_t)((uint16_t)(counted - 1) >> 8);
     } else {
+        dropped = (uint16_t)((uint16_t)(s->count_high << 8) + (s->count_low ? s->count_low : 256u));
+        dropped = (uint16_t)(dropped - periods);
         s->count_low = new_low;
         s->count_high = new_high;
         SREG = sreg;
     }
+    return dropped;
 }
 
 uint8_t step_port_lock(void)

@@ -11,10 +11,14 @@
 #define TAIL_TICKS 320u          /* the end of the closing interval, on which a following command is joined */
 #define SHORTEST_PIECE_TICKS 128u
 #define SILENCE_MAX_PERIODS 65000u
-#define AHEAD_TICKS 16384u       /* silence begun before a profile is planned: 1 ms */
+#define AHEAD_TICKS 49152u /* silence begun before a profile is planned: 3 ms */
+#define AHEAD_PERIODS 12u /* of which the last one is where the next segment must be there */
 #define CUT_KEEP_TICKS 16384u    /* motion left to run while a deceleration is planned */
 #define CRUISE_GROUP_TICKS 1600u /* shortest run of a cruise whose interval has a fraction */
 #define RING_RESERVE 4u          /* segments that one step of emission may need */
+#define STEADY_MOST_GROUPS 12u /* emitted in the short way at a time (ramp.c) */
+#define STEADY_LEAST_Q8 (UNSPLIT_BELOW_TICKS * 256ul) /* of groups too small for an early reload */
+#define UNSPLIT_BELOW_TICKS 128u
 
 /* What comes next of the command being emitted. */
 typedef enum {
@@ -26,14 +30,10 @@ typedef enum {
     STAGE_END,
 } stage_t;
 
-typedef struct {
-    motion_command_t command;
-    profile_t profile;
-} job_t;
-
 static profile_basis_t basis;
-static job_t now;  /* being emitted or played */
-static job_t next; /* taken, planned, not begun */
+static motion_command_t command; /* being emitted or played */
+static profile_t profile;        /* what is left of it to be emitted */
+static motion_command_t next;    /* taken, not begun */
 static bool next_taken;
 static bool playing; /* the timer runs (it may play silence) */
 static stage_t stage;
@@ -48,12 +48,12 @@ static uint32_t ahead_ticks;     /* part of the next interval that has been emit
 static bool dir_due;             /* the next single period sets the dir pin */
 static profile_interval_t closing; /* of the last command emitted */
 static uint8_t tail_offset;      /* its tail segment, while stage is REST, GAP or END */
-static bool tail_valid;
+static bool tail_valid;          /* a command can still be joined to it */
+static bool tail_awaited;        /* it has not begun yet: its command has not ended */
 static bool tail_fast;           /* too fast for a tail: a following command lengthens the last run instead */
 static uint8_t last_run_offset;
 
-static uint8_t retired; /* offset of the first segment not yet added to position */
-static int32_t position;
+static int32_t emitted; /* position, in pulses, when all that is in the ring has been played */
 static uint8_t ended;
 static uint8_t faults;
 static bool gap_on = true;
@@ -71,9 +71,9 @@ static bool dir_level(bool ccw)
     return ccw != (settings.cw_level != 0);
 }
 
-static bool is_ccw(const job_t *job)
+static bool is_ccw(const motion_command_t *c)
 {
-    return (job->command.flags & MOTION_CCW) != 0;
+    return (c->flags & MOTION_CCW) != 0;
 }
 
 void engine_init(void)
@@ -94,6 +94,16 @@ static segment_t *segment_at(uint8_t offset)
 static uint8_t early_periods(uint8_t flags)
 {
     return (uint8_t)(((flags >> SEGMENT_EARLY_BIT) & 1) + ((flags >> SEGMENT_EARLIER_BIT) & 1));
+}
+
+/* Which reload a period of top + 1 ticks needs. */
+static uint8_t early_flags(uint16_t top)
+{
+    if (top >= SEGMENT_EARLY_BELOW_TICKS - 1)
+        return 0;
+    if (top >= SEGMENT_EARLIER_BELOW_TICKS - 1)
+        return 1 << SEGMENT_EARLY_BIT;
+    return 1 << SEGMENT_EARLY_BIT | 1 << SEGMENT_EARLIER_BIT;
 }
 
 /* Periods that the interrupt counts: those waited for early are not among them. */
@@ -120,35 +130,88 @@ static uint8_t ring_free(void)
 }
 
 /* Pulses of the running command that are not in the ring yet, its closing interval apart. */
+static uint32_t profile_pulses_left(void)
+{
+    return profile.accel_pulses + profile.cruise_pulses + profile.decel_pulses;
+}
+
 static uint8_t pulses_to_come(void)
 {
-    const profile_t *p = &now.profile;
-    uint32_t left = p->accel_pulses + p->cruise_pulses + p->decel_pulses;
+    uint32_t left = profile_pulses_left();
     return left > 255 ? 254 : left > 1 ? (uint8_t)(left - 1) : 0;
 }
 
-/* Appends `periods` periods of `ticks`. Runs too short to be reloaded in time (less than 96 ticks a period and hardly
- * more periods than are waited for) are stretched: their count stays exact. */
+static void add_pulses(uint8_t flags, uint16_t pulses)
+{
+    if (flags & (1 << SEGMENT_CCW_BIT))
+        emitted -= pulses;
+    else
+        emitted += pulses;
+}
+
+/* The command whose closing interval has begun its tail has ended. */
+static void look_for_end(void)
+{
+    uint8_t from_tail = (uint8_t)(step_head - tail_offset);
+    if (tail_awaited && from_tail > (uint8_t)(step_head - step_tail)) {
+        tail_awaited = false;
+        ended++;
+    }
+}
+
+/* The interrupt has repeated the last interval because the ring was empty: so many pulses fewer are to be made. Returns
+ * how many of them the phases to come could not give. */
+static uint16_t absorb_held(void)
+{
+    uint8_t lock = step_port_lock();
+    uint16_t held = step_held;
+    step_held = 0;
+    step_port_unlock(lock);
+    if (held == 0)
+        return 0;
+    faults |= ENGINE_FAULT_STARVED;
+    add_pulses(step_flags, held);
+    /* The cruise becomes shorter, or, where there is none, the ramps; the closing interval stays. */
+    uint32_t *phases[] = {&profile.cruise_pulses, &profile.accel_pulses, &profile.decel_pulses};
+    uint32_t left = profile_pulses_left();
+    uint16_t given = left > held ? held : left ? (uint16_t)(left - 1) : 0;
+    held = (uint16_t)(held - given);
+    for (uint8_t i = 0; i < 3; i++) {
+        uint16_t some = *phases[i] < given ? (uint16_t)*phases[i] : given;
+        *phases[i] -= some;
+        given = (uint16_t)(given - some);
+    }
+    return held;
+}
+
+/* Appends `periods` periods of `top` + 1 ticks. Runs too short to be reloaded in time (less than 96 ticks a period and
+ * hardly more periods than are waited for) are stretched: their count stays exact. */
 static void push(uint16_t periods, uint16_t top, bool pulse, motion_state_t state)
 {
     segment_t *s = segment_at(step_head);
     uint8_t flags = (uint8_t)state;
-    if (top < SEGMENT_EARLY_BELOW_TICKS - 1) {
-        uint8_t early = 1 << SEGMENT_EARLY_BIT;
-        if (top < SEGMENT_EARLIER_BELOW_TICKS - 1)
-            early |= 1 << SEGMENT_EARLIER_BIT;
-        if (periods > early_periods(early)) {
-            flags |= early;
-            periods = (uint16_t)(periods - early_periods(early));
-        } else {
-            top = SEGMENT_EARLY_BELOW_TICKS - 1;
-        }
-    }
-    if (is_ccw(&now))
+    if (tail_awaited)
+        look_for_end();
+    if (is_ccw(&command))
         flags |= 1 << SEGMENT_CCW_BIT;
+    while (pulse && step_held) {
+        uint16_t too_many = absorb_held();
+        if (too_many >= periods)
+            return;
+        periods = (uint16_t)(periods - too_many);
+    }
+    if (pulse)
+        add_pulses(flags, periods);
+    uint8_t early = early_flags(top);
+    if (periods > early_periods(early)) {
+        flags |= early;
+        periods = (uint16_t)(periods - early_periods(early));
+    } else if (early) {
+        top = SEGMENT_EARLY_BELOW_TICKS - 1;
+    }
     if (dir_due && periods == 1) {
         flags |= 1 << SEGMENT_SET_DIR_BIT;
-        if (dir_level(is_ccw(&now)))
+        if (dir_level(is_ccw(&command)))
             flags |= 1 << SEGMENT_DIR_BIT;
         dir_due = false;
     }
@@ -157,79 +220,50 @@ static void push(uint16_t periods, uint16_t top, bool pulse, motion_state_t stat
     s->count_low = (uint8_t)periods;
     s->count_high = (uint8_t)((uint16_t)(periods - 1) >> 8);
     s->flags = flags;
-    step_hold = pulse ? pulses_to_come() : 0;
+    uint8_t hold = pulse ? pulses_to_come() : 0;
+    uint8_t lock = step_port_lock();
+    step_hold = hold > step_held ? (uint8_t)(hold - step_held) : 0; /* those held meanwhile will be given back */
     step_head = (uint8_t)(step_head + SEGMENT_BYTES);
+    step_port_unlock(lock);
 }
 
-static void add_pulses(uint8_t flags, uint16_t pulses)
+static int16_t signed_pulses(const segment_t *s, uint16_t pulses)
 {
-    if (flags & (1 << SEGMENT_CCW_BIT))
-        position -= pulses;
-    else
-        position += pulses;
-}
-
-/* Adds what the interrupt has left behind to the position: all segments before the loaded one. */
-static void retire_to(uint8_t offset)
-{
-    while (retired != offset) {
-        const segment_t *s = segment_at(retired);
-        if (!is_silent(s)) {
-            add_pulses(s->flags, counted_periods(s));
-            add_pulses(s->flags, early_periods(s->flags));
-        }
-        if ((s->flags & SEGMENT_STATE_MASK) == MOTION_STOP)
-            ended++;
-        retired = (uint8_t)(retired + SEGMENT_BYTES);
-    }
-}
-
-static void skip_pulses(uint8_t pulses);
-
-static bool retire(void)
-{
-    if (!playing)
-        return false;
-    uint8_t loaded = (uint8_t)(step_tail - SEGMENT_BYTES);
-    bool some = retired != loaded;
-    retire_to(loaded);
-    if (step_late) {
-        step_late = 0;
-        faults |= ENGINE_FAULT_LATE;
-    }
-    if (step_held) {
-        uint8_t lock = step_port_lock();
-        uint8_t held = step_held;
-        step_held = 0;
-        step_port_unlock(lock);
-        faults |= ENGINE_FAULT_STARVED;
-        add_pulses(step_flags, held);
-        skip_pulses(held);
-    }
-    return some;
-}
-
-/* Pulses made after the last retired segment, clockwise positive. */
-static int16_t pulses_since_retired(void)
-{
-    step_snapshot_t at = step_port_snapshot();
-    uint8_t loaded_offset = (uint8_t)(at.tail - SEGMENT_BYTES);
-    retire_to(loaded_offset);
-    const segment_t *loaded = segment_at(loaded_offset);
-    const segment_t *before = segment_at((uint8_t)(loaded_offset - SEGMENT_BYTES));
-    uint16_t begun = (uint16_t)(counted_periods(loaded) - at.to_count);
-    const segment_t *running = begun ? loaded : before;
-    int16_t pulses = begun ? (int16_t)(begun - 1) : -1;
-    if (at.period_over || at.pulse_high)
-        pulses++;
-    if (is_silent(running))
+    if (is_silent(s))
         return 0;
-    return running->flags & (1 << SEGMENT_CCW_BIT) ? (int16_t)-pulses : pulses;
+    return s->flags & (1 << SEGMENT_CCW_BIT) ? (int16_t)-pulses : (int16_t)pulses;
+}
+
+/* Pulses in the segments from `offset` on, clockwise positive. */
+static int32_t pulses_from(uint8_t offset)
+{
+    int32_t pulses = 0;
+    while (offset != step_head) {
+        const segment_t *s = segment_at(offset);
+        int16_t some = signed_pulses(s, (uint16_t)(counted_periods(s) + early_periods(s->flags)));
+        pulses += some;
+        offset = (uint8_t)(offset + SEGMENT_BYTES);
+    }
+    return pulses;
 }
 
 int32_t engine_position(void)
 {
-    return playing ? position + pulses_since_retired() : position;
+    if (!playing)
+        return emitted;
+    step_snapshot_t at = step_port_snapshot();
+    uint8_t loaded_offset = (uint8_t)(at.tail - SEGMENT_BYTES);
+    const segment_t *loaded = segment_at(loaded_offset);
+    const segment_t *running = loaded;
+    uint16_t counted = counted_periods(loaded);
+    if (at.to_count == counted)
+        running = segment_at((uint8_t)(loaded_offset - SEGMENT_BYTES));
+    int32_t to_come = pulses_from(at.tail);
+    if (!step_idle)
+        to_come += signed_pulses(loaded, (uint16_t)(at.to_count + early_periods(loaded->flags)));
+    if (!at.pulse_high && !at.period_over && !step_idle)
+        to_come += signed_pulses(running, 1);
+    return emitted - to_come;
 }
 
 /* -- emission -------------------------------------------------------------------------------------------------- */
@@ -291,15 +325,81 @@ static void push_run(uint16_t pulses, uint16_t longer, uint16_t ticks, bool fast
         push(longer, ticks, true, state);
 }
 
+/* push() without its cases: pulses of at least SEGMENT_EARLY_BELOW_TICKS, many more to come. */
+static inline void append(uint16_t periods, uint16_t top, uint16_t width, uint8_t flags)
+{
+    segment_t *s = segment_at(step_head);
+    s->top = top;
+    s->match = (uint16_t)(top - width);
+    s->count_low = (uint8_t)periods;
+    s->count_high = 0;
+    s->flags = flags;
+    step_head = (uint8_t)(step_head + SEGMENT_BYTES);
+}
+
+/* Several groups in the short way: the ramp hardly bends, each group fits the timer, and there are many pulses left. */
+static void emit_steady(uint32_t *left, uint32_t at_most, bool faster, motion_state_t state)
+{
+    uint16_t pulses = ramp.group;
+    uint8_t flags = (uint8_t)state;
+    uint16_t width = pulse_width_ticks();
+    uint16_t longest = (uint16_t)(pulses - 1);
+    if (is_ccw(&command))
+        flags |= 1 << SEGMENT_CCW_BIT;
+    /* What may be held meanwhile leaves enough for the groups made here. */
+    uint32_t spare = profile_pulses_left() - STEADY_MOST_GROUPS * pulses;
+    if (spare < 255) {
+        uint8_t lock = step_port_lock();
+        step_hold = (uint8_t)(spare - 1);
+        step_port_unlock(lock);
+    }
+    uint32_t sum_q8 = (uint16_t)carry_q8;
+    uint16_t made = 0;
+    uint16_t most = at_most > 0x7FFFu ? 0x7FFFu : (uint16_t)at_most;
+    most = (uint16_t)(most - 2 * pulses);
+    while (ramp.steady && ring_free() >= 2 && made <= most) {
+        ramp.steady--;
+        sum_q8 += ramp_step(&ramp) + ramp.excess_q8;
+        uint32_t ticks = sum_q8 >> 8;
+        uint16_t top = (uint16_t)((ticks >> ramp.group_log2) - 1);
+        uint16_t longer = (uint16_t)ticks & longest;
+        if (top < UNSPLIT_BELOW_TICKS) {
+            /* One interval for all: the ticks left over go into the next group. */
+            uint8_t early = early_flags(top);
+            append((uint16_t)(pulses - early_periods(early)), top, width, (uint8_t)(flags | early));
+            sum_q8 -= ((ticks - longer) << 8);
+        } else {
+            sum_q8 = (uint8_t)sum_q8;
+            if (longer && faster)
+                append(longer, (uint16_t)(top + 1), width, flags);
+            append((uint16_t)(pulses - longer), top, width, flags);
+            if (longer && !faster)
+                append(longer, (uint16_t)(top + 1), width, flags);
+        }
+        made = (uint16_t)(made + pulses);
+        if (step_held)
+            break;
+    }
+    carry_q8 = (int16_t)sum_q8;
+    *left -= made;
+    add_pulses(flags, made);
+}
+
 /* The next intervals of a ramp. */
 static void emit_ramp(uint32_t *left, uint32_t at_most, motion_state_t state, bool faster)
 {
     if (ramp_state != state) {
         ramp_state = state;
         if (state == MOTION_ACCEL)
-            profile_begin_accel(&now.profile, &basis, &ramp);
+            profile_begin_accel(&profile, &basis, &ramp);
         else
-            profile_begin_decel(&now.profile, &basis, &ramp);
+            profile_begin_decel(&profile, &basis, &ramp);
+    }
+    /* Enough left that held pulses can be given back, and periods that need no early reload. */
+    if (ramp.steady && at_most >= 2u * ramp.group && profile_pulses_left() > STEADY_MOST_GROUPS * ramp.group && !step_held &&
+        !tail_awaited && !dir_due && carry_q8 >= 0 && (ramp.group >= 4 || ramp.u.harmonic.q8 > STEADY_LEAST_Q8)) {
+        emit_steady(left, at_most, faster, state);
+        return;
     }
     ramp_time_t sum;
     uint16_t pulses = ramp_next(&ramp, &basis.ramp, at_most, &sum);
@@ -329,7 +429,7 @@ static void emit_ramp(uint32_t *left, uint32_t at_most, motion_state_t state, bo
 
 static void emit_cruise(uint32_t *left, uint32_t at_most)
 {
-    const profile_interval_t *interval = &now.profile.cruise;
+    const profile_interval_t *interval = &profile.cruise;
     uint32_t ticks = interval->ticks_q8 >> 8;
     uint8_t frac = (uint8_t)interval->ticks_q8;
     uint32_t chunks = interval->chunks;
@@ -345,6 +445,7 @@ static void emit_cruise(uint32_t *left, uint32_t at_most)
     }
     uint16_t run = at_most > 65000u ? 65000u : (uint16_t)at_most;
     if (frac == 0) {
+        *left -= run;
         push(run, (uint16_t)(ticks - 1), true, MOTION_CRUISE);
     } else {
         uint16_t block = 8;
@@ -354,15 +455,15 @@ static void emit_cruise(uint32_t *left, uint32_t at_most)
             run = block;
         uint32_t fraction = (uint32_t)run * frac + (uint16_t)carry_q8;
         carry_q8 = (int16_t)(fraction & 0xFF);
+        *left -= run;
         push_run(run, (uint16_t)(fraction >> 8), (uint16_t)ticks, true, MOTION_CRUISE);
     }
-    *left -= run;
 }
 
 /* The interval after the last pulse of the command: body, then tail. */
 static void begin_closing(void)
 {
-    profile_t *p = &now.profile;
+    profile_t *p = &profile;
     uint32_t chunks = 0;
     uint32_t ticks;
     motion_state_t state = p->decel_pulses ? MOTION_DECEL : p->cruise_pulses ? MOTION_CRUISE : MOTION_ACCEL;
@@ -412,6 +513,7 @@ static void push_tail(void)
     last_run_offset = (uint8_t)(step_head - SEGMENT_BYTES);
     tail_valid = true;
     push(1, (uint16_t)(ticks - 1), false, MOTION_STOP);
+    tail_awaited = true;
 }
 
 static bool join_next(void);
@@ -431,13 +533,13 @@ static bool emit(void)
         push(1, (uint16_t)(ticks - 1), piece_pulse, ramp_state);
         return true;
     }
-    profile_t *p = &now.profile;
+    profile_t *p = &profile;
     switch (stage) {
     case STAGE_REST:
         return false;
     case STAGE_LEAD: {
         /* The start wait, then the first pulse. */
-        uint32_t us = now.command.start_wait_us;
+        uint32_t us = command.start_wait_us;
         uint32_t chunks = us >> (PROFILE_CHUNK_LOG2 - 4);
         uint32_t ticks = (us & (PROFILE_CHUNK_TICKS / TICKS_PER_US - 1)) * TICKS_PER_US;
         if (chunks == 0 && ticks < DIR_SETUP_TICKS + pulse_width_ticks())
@@ -483,24 +585,6 @@ static bool emit(void)
     return false;
 }
 
-static void skip_pulses(uint8_t pulses)
-{
-    /* Held pulses were made at an interval that had been planned for other pulses: these are left out. */
-    profile_t *p = &now.profile;
-    while (pulses) {
-        uint32_t *left = p->accel_pulses ? &p->accel_pulses : p->cruise_pulses ? &p->cruise_pulses : &p->decel_pulses;
-        if (*left == 0)
-            return;
-        uint32_t most = *left < pulses ? *left : pulses;
-        if (left != &p->cruise_pulses && ramp_state == (left == &p->accel_pulses ? MOTION_ACCEL : MOTION_DECEL)) {
-            ramp_time_t sum;
-            most = ramp_next(&ramp, &basis.ramp, most, &sum);
-        }
-        *left -= most;
-        pulses = (uint8_t)(pulses - most);
-    }
-}
-
 /* -- starting and joining ----------------------------------------------------------------------------------------- */
 
 static void begin_ring(void)
@@ -508,8 +592,9 @@ static void begin_ring(void)
     if (playing)
         step_port_halt();
     step_head = step_tail = 0;
-    retired = 0;
     step_hold = 0;
+    step_held = 0;
+    step_idle = 0;
     carry_q8 = 0;
     ahead_ticks = 0;
     silence_chunks = 0;
@@ -519,39 +604,57 @@ static void begin_ring(void)
     ramp_state = MOTION_STANDBY;
 }
 
+static void plan(void)
+{
+    profile_plan(&profile, &basis, &command, v_in_play);
+}
+
 static void play(void)
 {
     playing = true;
     step_port_start();
 }
 
-/* Starts `now`, which is not planned yet, from standstill. */
+/* From standstill the first interval of a ramp is long, whatever the profile turns out to be: the first pulse need not
+ * wait for the planning. True where that is certain, with few operations. */
+static bool may_plan_later(void)
+{
+    uint32_t v_target = profile_rpm(&basis, &command) * 100u << basis.factor_log2;
+    uint32_t accel = accel_centi(command.accel);
+    if (v_in_play != basis.v_slow || command.accel == ACCEL_NONE || command.start_wait_us != 0 ||
+        basis.slow_ticks < AHEAD_TICKS + SHORTEST_PIECE_TICKS || v_target <= basis.v_slow)
+        return false;
+    if (!(command.flags & MOTION_LINEAR))
+        return (v_target - basis.v_slow) >> basis.factor_log2 >= accel; /* at least one step at slow speed */
+    /* c0 = sqrt(3.217e17 / (sprf * F * centi)) ticks; at least one step from 100 RPM on with 200 steps and more */
+    return basis.steps_per_rev >= 200 && v_target >> basis.factor_log2 >= 10000u && command.accel == command.decel &&
+           accel <= (130000000u >> basis.factor_log2) / basis.steps_per_rev;
+}
+
+/* Starts the command, which is not planned yet, from standstill. */
 static void start_now(void)
 {
     begin_ring();
-    step_port_dir(dir_level(is_ccw(&now)));
+    step_port_dir(dir_level(is_ccw(&command)));
     stage = STAGE_LEAD;
-    bool plan_later = v_in_play == basis.v_slow && now.command.accel != ACCEL_NONE &&
-                      basis.slow_ticks >= AHEAD_TICKS + SHORTEST_PIECE_TICKS && basis.factor_log2 <= 4 &&
-                      now.command.start_wait_us == 0 &&
-                      profile_rpm(&basis, &now.command) * 100u << basis.factor_log2 > basis.v_slow;
+    bool plan_later = may_plan_later();
     if (plan_later) {
         /* The first interval is long, whatever the profile: the pulse need not wait for the planning. */
-        now.profile.accel_pulses = 0;
-        now.profile.cruise_pulses = 0;
-        now.profile.decel_pulses = 0;
+        profile.accel_pulses = 0;
+        profile.cruise_pulses = 0;
+        profile.decel_pulses = 0;
         emit();
         emit();
         ramp_state = MOTION_ACCEL;
-        push(1, AHEAD_TICKS - 1, false, MOTION_ACCEL);
+        push(AHEAD_PERIODS, AHEAD_TICKS / AHEAD_PERIODS - 1, false, MOTION_ACCEL);
         segment_at(0)->flags |= MOTION_ACCEL;
         ahead_ticks = AHEAD_TICKS;
         play();
-        profile_plan(&now.profile, &basis, &now.command, v_in_play);
+        plan();
         ramp_state = MOTION_STANDBY;
         return;
     }
-    profile_plan(&now.profile, &basis, &now.command, v_in_play);
+    plan();
     uint8_t steps = 8;
     while (steps-- && ring_free() >= RING_RESERVE)
         emit();
@@ -567,11 +670,6 @@ static void expire_gap(void)
     }
 }
 
-static void plan_next(uint32_t v)
-{
-    profile_plan(&next.profile, &basis, &next.command, v);
-}
-
 /* Ticks of the start wait, saturated. */
 static uint32_t wait_ticks(uint32_t us)
 {
@@ -581,8 +679,8 @@ static uint32_t wait_ticks(uint32_t us)
 /* Lets the command in `next` follow the one that has been emitted. */
 static bool join_next(void)
 {
-    uint32_t wait = wait_ticks(next.command.start_wait_us);
-    bool turns = is_ccw(&next) != is_ccw(&now);
+    uint32_t wait = wait_ticks(next.start_wait_us);
+    bool turns = is_ccw(&next) != is_ccw(&command);
     uint8_t flags = MOTION_STOP;
     if (is_ccw(&next))
         flags |= 1 << SEGMENT_CCW_BIT;
@@ -596,12 +694,16 @@ static bool join_next(void)
     if (tail_valid && wait < SHORTEST_PIECE_TICKS) {
         if (tail_fast && !turns && wait == 0) {
             joined = step_port_extend(last_run_offset);
-            if (joined)
-                ended++; /* no tail is played */
+            if (joined && tail_awaited) {
+                tail_awaited = false; /* no tail is played */
+                ended++;
+            }
         } else {
             uint16_t top = (uint16_t)(segment_at(tail_offset)->top + wait);
             joined = step_port_arm(tail_offset, top, (uint16_t)(top - pulse_width_ticks()), flags);
         }
+        if (joined)
+            add_pulses(flags, 1);
     } else if (tail_valid) {
         /* The wait counts from the end of the command before; longer than the gap it means a start from slow speed. */
         uint32_t gap_ticks = closing.chunks < 0x10000u
@@ -609,7 +711,6 @@ static bool join_next(void)
                                  : UINT32_MAX;
         if (gap_on && wait > gap_ticks && v_in_play != basis.v_slow) {
             expire_gap();
-            plan_next(v_in_play);
         }
         joined = waited = step_port_drop_after(tail_offset);
     }
@@ -617,7 +718,7 @@ static bool join_next(void)
     piece_ticks = 0;
     next_taken = false;
     tail_valid = false;
-    now = next;
+    command = next;
     ramp_state = MOTION_STANDBY;
     if (!joined) {
         /* Too late to be joined: it starts by itself, at the velocity in play if the gap has not passed. */
@@ -626,14 +727,15 @@ static bool join_next(void)
         start_now();
         return true;
     }
+    plan();
     dir_due = waited && turns;
     stage = waited ? STAGE_LEAD : STAGE_RUN;
     return true;
 }
 
-status_t engine_check(const motion_command_t *command)
+status_t engine_check(const motion_command_t *c)
 {
-    return profile_check(&basis, command, settings.pulse_us);
+    return profile_check(&basis, c, settings.pulse_us);
 }
 
 bool engine_can_accept(void)
@@ -641,37 +743,41 @@ bool engine_can_accept(void)
     return !next_taken;
 }
 
-void engine_submit(const motion_command_t *command)
+void engine_submit(const motion_command_t *submitted)
 {
     if (!playing) {
-        now.command = *command;
+        command = *submitted;
         start_now();
         return;
     }
-    next.command = *command;
+    next = *submitted;
     next_taken = true;
-    if (stage == STAGE_REST || stage == STAGE_END || stage == STAGE_GAP) {
-        plan_next(v_in_play);
+    if (stage == STAGE_REST || stage == STAGE_END || stage == STAGE_GAP)
         join_next();
-    } else {
-        plan_next(now.profile.v_exit);
-    }
 }
 
 bool engine_poll(void)
 {
-    bool worked = retire();
+    bool worked = false;
+    if (tail_awaited)
+        look_for_end();
+    if (step_late) {
+        step_late = 0;
+        faults |= ENGINE_FAULT_LATE;
+    }
     if (playing && step_idle) {
         if (stage == STAGE_REST) {
             step_port_halt();
-            retire_to(step_tail);
             playing = false;
             tail_valid = false;
+            if (tail_awaited) {
+                tail_awaited = false;
+                ended++;
+            }
             expire_gap();
         } else if (step_head != step_tail) {
             /* The planner was so late that the timer ran out of segments: go on where it stopped. */
             faults |= ENGINE_FAULT_STARVED;
-            retire_to(step_tail);
             step_port_start();
         }
         worked = true;
@@ -687,9 +793,9 @@ bool engine_poll(void)
         pulses_due &= (uint16_t)((1u << (top_bit - 1)) - 1);
         pulses_due |= (uint16_t)(1u << (top_bit - 1));
         begin_ring();
-        now.command.flags = ccw ? MOTION_CCW : 0;
+        command.flags = ccw ? MOTION_CCW : 0;
         step_port_dir(dir_level(ccw));
-        now.profile.accel_pulses = now.profile.cruise_pulses = now.profile.decel_pulses = 0;
+        profile.accel_pulses = profile.cruise_pulses = profile.decel_pulses = 0;
         push(1, (uint16_t)(DIR_SETUP_TICKS + pulse_width_ticks() - 1), true, MOTION_STANDBY);
         push(1, SHORTEST_PIECE_TICKS - 1, false, MOTION_STANDBY);
         stage = STAGE_REST;
@@ -720,12 +826,11 @@ static void halt(void)
     if (!playing)
         return;
     step_port_halt();
-    retire();
-    position += pulses_since_retired();
-    retired = step_tail;
-    bool tail_played = stage == STAGE_REST && motion_state == MOTION_STANDBY;
-    if (!tail_played)
+    look_for_end();
+    emitted = engine_position();
+    if (stage != STAGE_REST || tail_awaited)
         ended++;
+    tail_awaited = false;
     playing = false;
     tail_valid = false;
     silence_chunks = 0;
@@ -785,12 +890,13 @@ static uint32_t cut(void)
             left = counted_periods(segment_at(offset));
     }
     const segment_t *last = segment_at(offset);
-    if (is_silent(last) || now.profile.v_exit == 0)
+    if (is_silent(last) || profile.v_exit == 0)
         return 0;
     if (interval_ticks > basis.slow_ticks + 1)
         return 0;
-    motion_state_t state = (motion_state_t)(last->flags & SEGMENT_STATE_MASK);
-    step_port_shorten(offset, left);
+    emitted -= pulses_from((uint8_t)(offset + SEGMENT_BYTES));
+    emitted -= signed_pulses(last, step_port_shorten(offset, left));
+    tail_awaited = false;
     silence_chunks = 0;
     piece_ticks = 0;
     ahead_ticks = 0;
@@ -799,7 +905,6 @@ static uint32_t cut(void)
     closing.ticks_q8 = period_ticks(last) << 8;
     if (interval_ticks == 0)
         interval_ticks = period_ticks(last);
-    (void)state;
     return ramp_velocity(&basis.ramp, interval_ticks);
 }
 
@@ -822,15 +927,13 @@ static void end_command(accel_code_t decel, bool linear)
         return;
     }
     ramp_time_t interval = ramp_interval(&basis.ramp, v);
-    profile_plan_decel(&now.profile, &basis, v, decel, linear);
-    now.profile.cruise.chunks = interval.ticks >> PROFILE_CHUNK_LOG2;
-    now.profile.cruise.ticks_q8 = (interval.ticks & (PROFILE_CHUNK_TICKS - 1)) << 8;
-    if (now.profile.decel_pulses == 0)
-        now.profile.cruise_pulses = 1; /* the closing interval */
+    profile_plan_decel(&profile, &basis, v, decel, linear);
+    profile.cruise.chunks = interval.ticks >> PROFILE_CHUNK_LOG2;
+    profile.cruise.ticks_q8 = (interval.ticks & (PROFILE_CHUNK_TICKS - 1)) << 8;
+    if (profile.decel_pulses == 0)
+        profile.cruise_pulses = 1; /* the closing interval */
     ramp_state = MOTION_STANDBY;
     stage = STAGE_RUN;
-    if (next_taken)
-        plan_next(now.profile.v_exit);
 }
 
 void engine_stop_graceful(accel_code_t decel, bool linear)
@@ -847,7 +950,7 @@ void engine_next(void)
 
 void engine_next_graceful(void)
 {
-    end_command(now.command.decel, (now.command.flags & MOTION_LINEAR) != 0);
+    end_command(command.decel, (command.flags & MOTION_LINEAR) != 0);
 }
 
 void engine_single_pulse(bool ccw)
@@ -871,8 +974,8 @@ void engine_velocity(uint32_t *rpm, uint32_t *cycle_us)
     uint32_t exact_cycle_us = in_play_cycle_us;
     motion_state_t state = engine_state();
     if (playing && state == MOTION_CRUISE) {
-        exact_cycle_us = now.profile.cycle_us;
-        v = profile_rpm(&basis, &now.command) * 100u << basis.factor_log2;
+        exact_cycle_us = profile.cycle_us;
+        v = profile_rpm(&basis, &command) * 100u << basis.factor_log2;
     } else if (playing && (state == MOTION_ACCEL || state == MOTION_DECEL)) {
         /* The interval being played: its silent part, if any, is the segment before its last period. */
         uint8_t offset = (uint8_t)(step_port_snapshot().tail - SEGMENT_BYTES);
@@ -912,12 +1015,12 @@ uint8_t engine_faults(void)
     return faults;
 }
 
-uint32_t command_rpm(const motion_command_t *command)
+uint32_t command_rpm(const motion_command_t *c)
 {
-    return profile_rpm(&basis, command);
+    return profile_rpm(&basis, c);
 }
 
-uint32_t command_cycle_us(const motion_command_t *command)
+uint32_t command_cycle_us(const motion_command_t *c)
 {
-    return profile_cycle_us(&basis, command);
+    return profile_cycle_us(&basis, c);
 }

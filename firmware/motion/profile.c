@@ -2,12 +2,12 @@
 #include "motion/profile.h"
 #include <math.h>
 
-#define TICKS_PER_US 16u
+#define LONGEST_RAMP_STEPS 16777216.0f /* two of them times 128 microsteps fit 32 bits */
 
 void profile_basis(profile_basis_t *basis, uint16_t steps_per_rev, uint8_t factor_log2, uint8_t slow_rpm)
 {
     ramp_constants(&basis->ramp, steps_per_rev);
-    basis->us_rpm = 60000000ul / steps_per_rev;
+    basis->us_rpm = (uint32_t)60000000 / steps_per_rev;
     basis->steps_per_rev = steps_per_rev;
     basis->factor_log2 = factor_log2;
     basis->v_slow = (uint32_t)slow_rpm * 100u << factor_log2;
@@ -32,7 +32,7 @@ static profile_interval_t pulse_interval(uint32_t cycle_us, uint8_t factor_log2)
     uint8_t chunk_us_log2 = (uint8_t)(PROFILE_CHUNK_LOG2 - 4 + factor_log2); /* 16 ticks a microsecond */
     profile_interval_t interval;
     interval.chunks = cycle_us >> chunk_us_log2;
-    interval.ticks_q8 = ((cycle_us & ((1ul << chunk_us_log2) - 1)) << 12) >> factor_log2;
+    interval.ticks_q8 = ((cycle_us & (((uint32_t)1 << chunk_us_log2) - 1)) << 12) >> factor_log2;
     return interval;
 }
 
@@ -62,7 +62,7 @@ static uint32_t linear_steps(const profile_basis_t *basis, uint32_t v, uint32_t 
     uint32_t centi_rpm = v >> basis->factor_log2;
     float rpm = (float)centi_rpm * 0.01f;
     float exact = rpm * rpm * basis->linear_steps / (float)centi;
-    return exact < 4294967040.0f ? (uint32_t)exact : UINT32_MAX;
+    return exact < LONGEST_RAMP_STEPS ? (uint32_t)exact : (uint32_t)LONGEST_RAMP_STEPS;
 }
 
 uint32_t profile_ramp_steps(const profile_basis_t *basis, uint32_t v_from, uint32_t v_to, uint32_t centi, bool linear)
@@ -78,11 +78,12 @@ uint32_t profile_ramp_steps(const profile_basis_t *basis, uint32_t v_from, uint3
     return from > to ? from - to : to - from;
 }
 
+/* a * b / divisor, truncated; of large ones to the precision of a float, which is enough for a ratio. */
 static uint32_t scale(uint32_t a, uint32_t b, uint32_t divisor)
 {
     if (a < 65536u && b < 65536u)
         return a * b / divisor;
-    return (uint32_t)((uint64_t)a * b / divisor);
+    return (uint32_t)((float)a * (float)b / (float)divisor);
 }
 
 /* Change of v^2 per pulse of a linear ramp, in units^2: 2 * alpha * accel. */
@@ -91,13 +92,39 @@ static float square_per_pulse(const profile_basis_t *basis, uint32_t centi)
     return 114591.559f * (float)centi * (float)(1u << basis->factor_log2) / (float)basis->steps_per_rev;
 }
 
-/* Velocity after n (may be fractional) pulses of the acceleration. */
-static uint32_t velocity_after(const profile_t *profile, const profile_basis_t *basis, uint32_t from, float pulses)
+static uint32_t root(float square)
 {
-    float change = pulses * square_per_pulse(basis, profile->accel_centi);
-    float square = (float)from * (float)from;
-    square = profile->faster ? square + change : square - change;
     return square > 0.0f ? (uint32_t)(sqrtf(square) + 0.5f) : 0;
+}
+
+/* The velocity that the acceleration reaches (v_peak), and that of its last interval. */
+static uint32_t reached(profile_t *profile, const profile_basis_t *basis, uint32_t v_target)
+{
+    uint32_t v_peak;
+    uint32_t v_last;
+    uint32_t pulses = profile->accel_pulses;
+    bool faster = profile->faster;
+    if (profile->linear) {
+        float per_pulse = square_per_pulse(basis, profile->accel_centi);
+        float square = 0.0f;
+        if (profile->v_start != basis->v_slow || !faster)
+            square = (float)profile->v_start * (float)profile->v_start;
+        if (!faster)
+            per_pulse = -per_pulse;
+        square += (float)pulses * per_pulse;
+        v_peak = root(square);
+        v_last = root(square - 0.5f * per_pulse);
+    } else {
+        uint32_t step = faster ? profile->accel_centi : -profile->accel_centi;
+        v_peak = profile->v_start + step * pulses;
+        v_last = v_peak - step;
+    }
+    if (faster ? v_peak > v_target : v_peak < v_target)
+        v_peak = v_target;
+    if (faster ? v_last > v_target : v_last < v_target)
+        v_last = v_target;
+    profile->v_peak = v_peak;
+    return v_last;
 }
 
 void profile_plan(profile_t *profile, const profile_basis_t *basis, const motion_command_t *command, uint32_t v_in)
@@ -137,9 +164,8 @@ void profile_plan(profile_t *profile, const profile_basis_t *basis, const motion
     /* Full steps are truncated as full steps, so that a ramp covers the same steps whatever the factor. */
     uint8_t after_log2 = factor_log2;
     if (command->flags & MOTION_PULSES) {
-        uint32_t most = UINT32_MAX >> factor_log2;
-        accel = (accel > most ? most : accel) << factor_log2;
-        decel = (decel > most ? most : decel) << factor_log2;
+        accel <<= factor_log2;
+        decel <<= factor_log2;
         after_log2 = 0;
     }
     uint32_t total = command->count;
@@ -147,11 +173,6 @@ void profile_plan(profile_t *profile, const profile_basis_t *basis, const motion
     bool truncated = accel > total || decel > total - accel;
     if (truncated) {
         uint32_t whole = accel + decel;
-        if (whole < accel) { /* beyond 32 bits: half the scale is exact enough for a ratio */
-            accel >>= 1;
-            decel >>= 1;
-            whole = accel + decel;
-        }
         uint32_t scaled = scale(decel, total, whole);
         if (scaled > 1)
             scaled = total - scale(accel, total, whole);
@@ -166,39 +187,22 @@ void profile_plan(profile_t *profile, const profile_basis_t *basis, const motion
     profile->cruise_pulses = (cruise << after_log2) + (truncated ? 0 : command->extra_pulses);
 
     /* The velocity reached, and the one that stays. */
-    accel = profile->accel_pulses;
-    uint32_t v_peak = v_target;
     uint32_t v_last = v_target; /* of the last interval, if it is one of the acceleration */
-    if (accel != 0 && (truncated || profile->cruise_pulses == 0)) {
-        if (profile->linear) {
-            uint32_t from = v_start == v_slow && profile->faster ? 0 : v_start;
-            v_peak = velocity_after(profile, basis, from, (float)accel);
-            v_last = velocity_after(profile, basis, from, (float)accel - 0.5f);
-        } else {
-            uint32_t change = profile->accel_centi * accel;
-            v_peak = profile->faster ? v_start + change : v_start - change;
-            v_last = profile->faster ? v_peak - profile->accel_centi : v_peak + profile->accel_centi;
-        }
-        if (profile->faster ? v_peak > v_target : v_peak < v_target)
-            v_peak = v_target;
-        if (profile->faster ? v_last > v_target : v_last < v_target)
-            v_last = v_target;
-    } else if (truncated && accel == 0) {
-        v_peak = v_start;
-    }
-    profile->v_peak = v_peak;
+    profile->v_peak = v_target;
+    if (truncated || cruise == 0)
+        v_last = profile->accel_pulses ? reached(profile, basis, v_target) : (profile->v_peak = v_start);
     profile->exit_cycle_us = 0;
     if (profile->decel_pulses != 0) {
         profile->v_exit = v_slow;
         if (profile->linear) {
             /* v^2 that the deceleration can take off, against what it has to */
             float able = (float)profile->decel_pulses * square_per_pulse(basis, profile->decel_centi);
-            float needed = (float)v_peak * (float)v_peak;
+            float needed = (float)profile->v_peak * (float)profile->v_peak;
             profile->steep_decel = needed > able * 1.02f + 4.0f * square_per_pulse(basis, profile->decel_centi) *
                                                                 (float)(1u << factor_log2);
         } else {
             profile->steep_decel =
-                v_peak - v_slow > profile->decel_centi * (profile->decel_pulses + (1ul << factor_log2));
+                profile->v_peak - v_slow > profile->decel_centi * (profile->decel_pulses + ((uint32_t)1 << factor_log2));
         }
     } else if (profile->cruise_pulses != 0) {
         profile->v_exit = v_target;

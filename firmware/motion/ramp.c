@@ -7,11 +7,15 @@
 #include <math.h>
 
 /* Shortest group worth planning: the planner's cost per group plus the interrupt's, in cycles = ticks. */
-#define GROUP_MIN_TICKS 800u
-#define GROUP_MIN_TICKS_FULL 1600u /* harmonic, while every interval has to be computed from scratch */
-#define GROUP_MIN_TICKS_LINEAR 1600u
-#define GROUP_MIN_TICKS_LINEAR_FULL 3500u
+#define GROUP_MIN_TICKS 690u
+#define GROUP_MORE_TICKS 400u /* of several pulses: two reloads ... */
+#define GROUP_PULSE_TICKS 24u /* ... and the count of each */
+#define GROUP_MIN_TICKS_FULL 3600u /* harmonic, while every interval has to be computed from scratch */
+#define GROUP_MIN_TICKS_LINEAR 4500u
+#define GROUP_MIN_TICKS_LINEAR_FULL 7000u
 #define GROUP_MAX 128u
+#define STEADY_GROUPS 12u /* until the next review of a group's size */
+#define STEADY_MAX_Q8 (50000ul << 8) /* their intervals stay below 65536 ticks */
 #define GROUP_MAX_TICKS 65536u /* so that a group's periods fit the timer and a command can be cut soon */
 
 void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev)
@@ -70,6 +74,7 @@ void ramp_begin_harmonic(ramp_t *ramp, const ramp_constants_t *constants, uint32
                          uint32_t v_cap)
 {
     ramp->linear = false;
+    ramp->steady = 0;
     ramp->faster = faster;
     ramp->group = 0;
     ramp->group_limit = 1;
@@ -86,14 +91,18 @@ void ramp_begin_harmonic(ramp_t *ramp, const ramp_constants_t *constants, uint32
 static uint16_t choose_group(uint16_t group, uint32_t interval_ticks, uint32_t slope_q8, uint16_t min_ticks)
 {
     uint16_t at_least = 1;
-    bool may_grow = interval_ticks * group < GROUP_MAX_TICKS / 2;
-    while (interval_ticks < min_ticks && at_least < GROUP_MAX) {
-        at_least = (uint16_t)(at_least * 2);
-        interval_ticks *= 2;
+    bool may_grow = interval_ticks < GROUP_MAX_TICKS / 2 / GROUP_MAX || interval_ticks * group < GROUP_MAX_TICKS / 2;
+    if (interval_ticks < min_ticks) {
+        min_ticks = (uint16_t)(min_ticks + GROUP_MORE_TICKS);
+        do {
+            at_least = (uint16_t)(at_least * 2);
+            interval_ticks *= 2;
+            min_ticks = (uint16_t)(min_ticks + at_least / 2 * GROUP_PULSE_TICKS);
+        } while (interval_ticks < min_ticks && at_least < GROUP_MAX);
     }
     if (group < at_least)
         return at_least;
-    if (slope_q8 <= 40 && group < GROUP_MAX && may_grow) /* twice the group spreads over less than 2 * 2 * 40 / 256 tick */
+    if (slope_q8 <= 64 && group < GROUP_MAX && may_grow) /* the intervals of twice the group differ by half a tick */
         return (uint16_t)(group * 2);
     if (slope_q8 > 192 && group > at_least)
         return (uint16_t)(group / 2);
@@ -111,16 +120,59 @@ static uint16_t limit_group(uint16_t group, uint32_t left)
     return left < 2u * group ? (uint16_t)left : group;
 }
 
-static void harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, uint32_t left, ramp_time_t *sum)
+#ifdef __AVR__
+#include "motion/ramp_offsets.h"
+#include <stddef.h>
+#define CHECK(name, member) _Static_assert(RAMP_##name == offsetof(ramp_t, member), "ramp_offsets.h: " #member)
+CHECK(GROUP_LOG2, group_log2);
+CHECK(NEXT2, u.harmonic.next2);
+CHECK(SPACING2, u.harmonic.spacing2);
+CHECK(MID2, u.harmonic.mid2);
+CHECK(Q8, u.harmonic.q8);
+CHECK(REST, u.harmonic.rest);
+CHECK(SLOPE, u.harmonic.slope);
+CHECK(CURVE, u.harmonic.curve);
+#else
+/* In assembler on the target: ramp_step.S. */
+uint32_t ramp_step(ramp_t *ramp)
+{
+    uint32_t spacing2 = ramp->u.harmonic.spacing2;
+    uint32_t q8 = ramp->u.harmonic.q8;
+    int32_t rest = ramp->u.harmonic.rest - (int32_t)(spacing2 * q8);
+    uint32_t mid2 = ramp->u.harmonic.mid2 + spacing2;
+    int32_t slope = ramp->u.harmonic.slope + ramp->u.harmonic.curve;
+    ramp->u.harmonic.mid2 = mid2;
+    rest -= (int32_t)((uint32_t)slope * mid2);
+    int32_t divisor = (int32_t)mid2;
+    int32_t half = divisor >> 1;
+    int32_t correction = 0;
+    while (rest > half) {
+        rest -= divisor;
+        correction++;
+    }
+    while (rest < -half) {
+        rest += divisor;
+        correction--;
+    }
+    ramp->u.harmonic.rest = rest;
+    ramp->u.harmonic.curve += correction;
+    slope += correction;
+    ramp->u.harmonic.slope = slope;
+    ramp->u.harmonic.q8 = q8 + (uint32_t)slope;
+    ramp->u.harmonic.next2 += spacing2;
+    return ramp->u.harmonic.q8 << ramp->group_log2;
+}
+#endif
+
+static uint16_t harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, uint32_t left, ramp_time_t *sum)
 {
     uint32_t step = ramp->u.harmonic.step;
     uint32_t next2 = ramp->u.harmonic.next2;
-    uint32_t interval_ticks = ramp->u.harmonic.q8 >> 8;
     uint32_t spacing2 = 2u * step * ramp->group_limit;
-    /* The slope carries on well only where the velocity changes by less than a sixteenth from group to group. */
-    bool from_scratch = spacing2 > next2 >> 4;
+    /* The slope carries on well only where the velocity changes by less than a 43rd from group to group. */
+    bool from_scratch = spacing2 > (next2 >> 6) + (next2 >> 7) || ramp->group == 0;
 
-    uint16_t wish = choose_group(ramp->group_limit, interval_ticks,
+    uint16_t wish = choose_group(ramp->group_limit, ramp->u.harmonic.q8 >> 8,
                                  ramp->group == 0 ? UINT16_MAX : magnitude(ramp->u.harmonic.slope),
                                  from_scratch ? GROUP_MIN_TICKS_FULL : GROUP_MIN_TICKS);
     if (from_scratch) {
@@ -128,95 +180,72 @@ static void harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, uint3
         while (wish > 1 && step * wish > next2 >> 3)
             wish /= 2;
     }
-    from_scratch = from_scratch || ramp->group == 0;
     ramp->group_limit = wish;
     uint16_t group = limit_group(wish, left);
 
-    uint32_t half = step * (uint16_t)(group - 1);
-    uint32_t mid2 = ramp->faster ? next2 + half : next2 - half;
-    ramp->u.harmonic.next2 = ramp->faster ? mid2 + half + 2 * step : mid2 - half - 2 * step;
-    if (mid2 > ramp->u.harmonic.cap2) {
-        mid2 = ramp->u.harmonic.cap2;
-        from_scratch = true;
-    }
-
-    uint32_t q8;
     uint32_t total;
-    int32_t slope;
     if (from_scratch || group != ramp->group) {
+        uint32_t half = step * (uint16_t)(group - 1);
+        uint32_t mid2 = ramp->faster ? next2 + half : next2 - half;
+        spacing2 = 2u * step * group;
+        if (!ramp->faster)
+            spacing2 = -spacing2;
+        ramp->u.harmonic.spacing2 = spacing2;
+        ramp->group = group;
+        if (mid2 > ramp->u.harmonic.cap2) {
+            mid2 = ramp->u.harmonic.cap2;
+            ramp->group = 0; /* not to be carried on from */
+        }
+        ramp->u.harmonic.mid2 = mid2;
+        ramp->group_log2 = 0;
+        for (uint16_t g = group; g > 1; g >>= 1)
+            ramp->group_log2++;
         if (mid2 < constants->v2_least) {
             /* Half a second and more: only at the start or end of a crawl. */
-            ramp_time_t wide = ramp_interval(constants, mid2 / 2);
-            *sum = wide;
+            *sum = ramp_interval(constants, mid2 / 2);
+            ramp->u.harmonic.next2 = next2 + spacing2;
             ramp->u.harmonic.q8 = UINT32_MAX;
-            ramp->u.harmonic.mid2 = mid2;
             ramp->group = 0;
-            return;
+            return 1;
         }
-        q8 = divide_k(constants, mid2, &ramp->u.harmonic.rest);
+        uint32_t q8 = divide_k(constants, mid2, &ramp->u.harmonic.rest);
+        ramp->u.harmonic.q8 = q8;
         /* The slope between groups of this size, up to this one, and its change: derivatives of K / v. */
-        float ratio = (float)(2u * step * group) / (float)mid2;
+        float ratio = (float)(int32_t)spacing2 / (float)mid2;
         float s = (float)q8 * ratio;
         ramp->u.harmonic.curve = (int32_t)(2.0f * s * ratio);
-        slope = (int32_t)(ramp->faster ? -s - s * ratio : s - s * ratio);
+        ramp->u.harmonic.slope = (int32_t)(-s - s * ratio);
         total = q8 * group;
         if (group > 1) {
             /* sum of K / v over the group = group * K / mid * (1 + s2 + s4 + ...), a power series in the relative
              * change y per pulse: s2 = (k^2 - 1) / 12 y^2, s4 = (k^2 - 1)(3 k^2 - 7) / 240 y^4. */
-            float k2 = (float)((uint16_t)group * (uint32_t)group);
+            float k2 = (float)((uint32_t)group * group);
             float y2 = ratio * ratio / k2;
             float s2 = (k2 - 1.0f) * y2 * (1.0f / 12.0f);
             total += (uint32_t)((float)total * s2 * (1.0f + (3.0f * k2 - 7.0f) * y2 * (1.0f / 20.0f)) + 0.5f);
         }
-    } else {
-        int32_t r = ramp->u.harmonic.rest;
-        uint32_t change2 = mid2 - ramp->u.harmonic.mid2; /* modulo 2^32 */
-        q8 = ramp->u.harmonic.q8;
-        r -= (int32_t)(change2 * q8);
-        int32_t slope_before = ramp->u.harmonic.slope;
-        slope = slope_before + ramp->u.harmonic.curve;
-        q8 += (uint32_t)slope;
-        r -= (int32_t)((uint32_t)slope * mid2);
-        int32_t divisor = (int32_t)mid2;
-        int32_t half_divisor = divisor >> 1;
-        if (r > half_divisor || r < -half_divisor) {
-            uint8_t tries = 6;
-            int32_t before = slope;
-            do {
-                if (r > half_divisor) {
-                    r -= divisor;
-                    slope++;
-                } else if (r < -half_divisor) {
-                    r += divisor;
-                    slope--;
-                } else {
-                    break;
-                }
-            } while (--tries);
-            if (!tries) {
-                int32_t correction = r / divisor;
-                slope += correction;
-                r -= correction * divisor;
-            }
-            q8 += (uint32_t)(slope - before);
-        }
-        ramp->u.harmonic.rest = r;
-        ramp->u.harmonic.curve = slope - slope_before;
-        total = q8 * group;
-        uint32_t s = magnitude(slope + ramp->u.harmonic.curve / 2);
-        if (group > 1 && s > 96) {
-            /* s2 from above, with s = change over the group: (k - 1/k) / 12 * s^2 / interval */
-            uint32_t excess = s < 0x8000u ? s * s / q8 : (uint32_t)((uint64_t)s * s / q8);
-            total += (excess * group - excess / group + 6u) / 12u;
-        }
+        ramp->u.harmonic.next2 = next2 + spacing2;
+        sum->ticks = total >> 8;
+        sum->frac = (uint8_t)total;
+        return group;
     }
-    ramp->u.harmonic.slope = slope;
-    ramp->u.harmonic.q8 = q8;
-    ramp->u.harmonic.mid2 = mid2;
-    ramp->group = group;
-
+    total = ramp_step(ramp);
+    if ((group & (group - 1)) != 0)
+        total = ramp->u.harmonic.q8 * group;
+    ramp->excess_q8 = 0;
+    uint32_t s = magnitude(ramp->u.harmonic.slope + ramp->u.harmonic.curve / 2);
+    if (group > 1 && s > 96) {
+        /* s2 from above, with s = change over the group: (k - 1/k) / 12 * s^2 / interval */
+        float excess = (float)s * (float)s / (float)ramp->u.harmonic.q8;
+        ramp->excess_q8 = (uint16_t)(excess * ((float)group - 1.0f / (float)group) * (1.0f / 12.0f) + 0.5f);
+        total += ramp->excess_q8;
+    }
+    /* The same again for a while, without looking at everything. */
+    if (ramp->u.harmonic.q8 < STEADY_MAX_Q8)
+        ramp->steady = STEADY_GROUPS;
     sum->ticks = total >> 8;
     sum->frac = (uint8_t)total;
+    return group;
 }
 
 /* -- linear ------------------------------------------------------------------------------------------------------ */
@@ -343,7 +372,7 @@ static uint32_t linear_exact(ramp_t *ramp, uint32_t s)
     return s;
 }
 
-static void linear_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum)
+static uint16_t linear_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum)
 {
     bool faster = ramp->faster;
     uint32_t s = ramp->u.linear.sum_q4;
@@ -417,13 +446,13 @@ static void linear_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum)
         sum->ticks = most;
         sum->frac = 0;
     }
+    return group;
 }
 
 uint16_t ramp_next(ramp_t *ramp, const ramp_constants_t *constants, uint32_t left, ramp_time_t *sum)
 {
     if (ramp->linear)
-        linear_next(ramp, left, sum);
-    else
-        harmonic_next(ramp, constants, left, sum);
-    return ramp->group ? ramp->group : 1;
+        return linear_next(ramp, left, sum);
+    ramp->steady = 0;
+    return harmonic_next(ramp, constants, left, sum);
 }

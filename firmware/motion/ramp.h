@@ -33,6 +33,9 @@ typedef struct {
 typedef struct {
     bool linear;
     bool faster;          /* velocity grows from pulse to pulse */
+    uint8_t steady;       /* groups that may follow in the same way before their size is reviewed */
+    uint8_t group_log2;   /* of a steady group */
+    uint16_t excess_q8;   /* what a steady group's sum exceeds its middle times its pulses by */
     uint16_t group;       /* pulses of the last group; 0: none yet */
     uint16_t group_limit; /* what the next group would like to be */
     uint32_t max_ticks;   /* linear: no interval above while slowing */
@@ -41,6 +44,7 @@ typedef struct {
             uint32_t next2; /* twice the velocity of the next pulse */
             uint32_t cap2;  /* never above */
             uint32_t step;  /* change of velocity per pulse */
+            uint32_t spacing2; /* change of mid2 from group to group, modulo 2^32 */
             uint32_t mid2;  /* twice the velocity in the middle of the last group */
             uint32_t q8;    /* interval there */
             int32_t rest;   /* k512 - q8 * mid2, exact */
@@ -85,6 +89,10 @@ void ramp_linear_time(wide_t *t_q4, const wide_t *c_q8, uint32_t n, wide_t *rest
 
 /* f >= 0, truncated. */
 void ramp_from_float(wide_t *x, float f);
+
+/* While ramp->steady and at least two groups are left: the next group in a short way. steady is counted down by the
+ * caller. Returns the sum of its intervals in 1/256 ticks, less excess_q8; it has ramp->group pulses, a power of two. */
+uint32_t ramp_step(ramp_t *ramp);
 
 /* The next group of at most `left` pulses: returns how many (>= 1) and the sum of their intervals. */
 uint16_t ramp_next(ramp_t *ramp, const ramp_constants_t *constants, uint32_t left, ramp_time_t *sum);

@@ -40,8 +40,9 @@ bool step_port_extend(uint8_t offset);
 /* Drops what follows the segment at `offset`. False if that has been loaded already. */
 bool step_port_drop_after(uint8_t offset);
 
-/* Lets the segment at `offset` end after at most `periods` more periods and drops what follows it. */
-void step_port_shorten(uint8_t offset, uint16_t periods);
+/* Lets the segment at `offset` end after at most `periods` more periods and drops what follows it. Returns how many of
+ * its periods were dropped. */
+uint16_t step_port_shorten(uint8_t offset, uint16_t periods);
 
 /* Holds interrupts off between the two, for a few cycles. */
 uint8_t step_port_lock(void);
