@@ -178,6 +178,7 @@ typedef enum {
     PATH_WRAPPED,
     PATH_LOADED,
     PATH_LOADED_DIR,
+    PATH_LATE,
     PATH_EARLY,
     PATH_EARLIER,
     PATH_EMPTY,
@@ -188,6 +189,7 @@ static const char *const path_names[PATHS] = {"period counted",
                                               "period counted, low byte wrapped",
                                               "segment loaded",
                                               "segment loaded, dir changed",
+                                              "segment loaded too late for its period (a fault)",
                                               "segment loaded one period early, the wait included",
                                               "segment loaded two periods early, the wait included",
                                               "ring empty"};
@@ -201,7 +203,7 @@ typedef struct {
     uint64_t count;
     uint16_t tail_address;
     uint16_t flags_address;
-    uint16_t head_address;
+    uint16_t late_address;
     uint8_t tail;
     uint8_t flags;
     uint8_t high;
@@ -235,7 +237,10 @@ static bool look_at_isr(board_t *board, void *ctx)
         bool early = paths->flags & 1 << 3;
         bool earlier = paths->flags & 1 << 4;
         bool dir = paths->flags & 1 << 7;
-        path = earlier ? PATH_EARLIER : early ? PATH_EARLY : dir ? PATH_LOADED_DIR : PATH_LOADED;
+        if (board_peek8(board, paths->late_address))
+            path = PATH_LATE;
+        else
+            path = earlier ? PATH_EARLIER : early ? PATH_EARLY : dir ? PATH_LOADED_DIR : PATH_LOADED;
     } else if (board_peek8(board, paths->flags_address) != paths->flags || cycles > 40) {
         path = PATH_EMPTY;
     } else if (board_peek8(board, GPIOR1_REGISTER) != paths->high) {
@@ -268,7 +273,7 @@ void row_isr_paths(result_t *result)
         run_begin(&run, (setup_t){.ustep = cases[i].ustep, .pulse_us = 1, .baud = 250000});
         paths->measures = run_measures(&run);
         paths->tail_address = code_symbol(&run, "step_tail");
-        paths->head_address = code_symbol(&run, "step_head");
+        paths->late_address = code_symbol(&run, "step_late");
         paths->flags_address = code_symbol(&run, "step_flags");
         paths->count = paths->measures->isr[STEP_VECTOR].count;
         paths->cycles = paths->measures->isr[STEP_VECTOR].cycles;
