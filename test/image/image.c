@@ -179,8 +179,9 @@ void image_run(uint64_t cycles)
 
 static bool still(void)
 {
-    enum { TCCR1B = 0x81, CLOCK_BITS = 7 };
-    return (board_peek8(board, TCCR1B) & CLOCK_BITS) == 0 && board_peek8(board, state_address) == STANDBY;
+    /* The step interrupt is off, or the timer plays silence without it. */
+    enum { TIMSK1 = 0x6F, TOIE1 = 1 };
+    return (board_peek8(board, TIMSK1) & TOIE1) == 0 && board_peek8(board, state_address) == STANDBY;
 }
 
 void image_idle(uint64_t most_cycles)
