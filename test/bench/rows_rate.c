@@ -68,8 +68,10 @@ void row_cruise_rate(result_t *result)
     figure(result, "none");
 }
 
+typedef enum { RAMPS_WRONG, RAMPS_COUNTED, RAMPS_KEPT } ramps_t; /* counted: an exact count, but a fault was latched */
+
 /* Both ramps of one kind up to the rate, while the terminal receives. */
-static bool ramps_kept(result_t *result, const rate_t *rate, bool linear)
+static ramps_t ramps_kept(result_t *result, const rate_t *rate, bool linear)
 {
     run_t run;
     char text[80];
@@ -94,8 +96,8 @@ static bool ramps_kept(result_t *result, const rate_t *rate, bool linear)
     char where[60];
     ramp_error_where(&error, &ideal, where, sizeof where);
     uint32_t overruns = board_uart_overruns(run.board);
-    bool kept = run.pulses == ideal_pulses(&ideal) && report.position == (int)run.pulses && report.faults == 0 &&
-                overruns == 0 && run.bad_widths == 0;
+    bool counted = run.pulses == ideal_pulses(&ideal) && report.position == (int)run.pulses && run.bad_widths == 0;
+    bool kept = counted && report.faults == 0 && overruns == 0;
     detail(
         result,
         "- %s to %g kHz: %zu of %llu pulses, position %d, faults %u, %zu lines received, %u bytes lost; error %.4f %% rms, "
@@ -104,20 +106,49 @@ static bool ramps_kept(result_t *result, const rate_t *rate, bool linear)
         report.position, report.faults, run.fed_lines, overruns, error.rms_percent, error.max_ticks,
         error.worst_ticks_percent, where, error.sum_ticks);
     run_end(&run, &result->worst);
-    return kept;
+    return kept ? RAMPS_KEPT : counted ? RAMPS_COUNTED : RAMPS_WRONG;
 }
 
+/* What the same reception costs without motion. */
+static void terminal_alone(result_t *result)
+{
+    run_t run;
+    uint64_t isr = 0;
+    run_begin(&run, (setup_t){.ustep = 0, .pulse_us = 2, .baud = 250000});
+    run_flood(&run, FLOOD_ANSWERED);
+    run_for(&run, TICKS_PER_S / 10);
+    run_measures_clear(&run);
+    run_for(&run, TICKS_PER_S);
+    const board_measures_t *m = run_measures(&run);
+    for (int v = 0; v < BOARD_VECTORS; v++)
+        isr += m->isr[v].cycles;
+    detail(result, "- reception alone, in standstill: %.1f %% in interrupts, asleep %.1f %%\n",
+           100.0 * (double)isr / (double)m->cycles, 100.0 * (double)m->sleep_cycles / (double)m->cycles);
+    run_end(&run, &result->worst);
+}
+
+/* Goes down from the highest rate to the first that is kept. */
 static void highest(result_t *result, const rate_t *rates, size_t count, bool linear)
 {
+    double counted = 0.0;
+    result->verdict = VERDICT_NOT_MET;
+    terminal_alone(result);
     for (size_t i = 0; i < count; i++) {
-        if (!ramps_kept(result, &rates[i], linear))
+        double khz = rate_khz(&rates[i]);
+        ramps_t ramps = ramps_kept(result, &rates[i], linear);
+        if (ramps != RAMPS_WRONG && counted == 0.0)
+            counted = khz;
+        if (ramps != RAMPS_KEPT)
             continue;
-        figure(result, "%g kHz", rate_khz(&rates[i]));
-        result->verdict = rate_khz(&rates[i]) >= 200.0 ? VERDICT_MET : VERDICT_NOT_MET;
+        figure(result, "%g kHz", khz);
+        if (counted > khz)
+            figure(result, " (exact count, but with a fault latched: %g kHz)", counted);
+        if (khz >= 200.0)
+            result->verdict = VERDICT_MET;
         return;
     }
-    figure(result, "below %g kHz", rate_khz(&rates[count - 1]));
-    result->verdict = VERDICT_NOT_MET;
+    figure(result, "below %g kHz (exact count, but with a fault latched: %g kHz)", rate_khz(&rates[count - 1]),
+           counted);
 }
 
 void row_harmonic_rate(result_t *result)
