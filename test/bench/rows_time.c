@@ -117,8 +117,8 @@ void row_streaming(result_t *result)
         detail(result, "- %zu commands of %u steps, vc", commands, cases[i].steps);
         for (size_t c = 0; c < commands; c++)
             detail(result, " %u", cases[i].cycle_us[c]);
-        detail(result, ": %llu ticks, %zu of %llu pulses, faults %u\n", (unsigned long long)most, run.pulses,
-               (unsigned long long)pulses, report.faults);
+        detail(result, ": %llu ticks, %zu of %llu pulses, position %d, faults %u\n", (unsigned long long)most,
+               run.pulses, (unsigned long long)pulses, report.position, report.faults);
         exact = exact && right;
         if (most > worst)
             worst = most;
