@@ -153,7 +153,7 @@ static void ring_empty(void)
     if (flags & SET_DIR)
         set_dir(p.begin + step_player_load_ticks, (flags & DIR) != 0);
     step_flags = flags & (uint8_t)~(EARLY | EARLIER | SET_DIR);
-    p.to_count = ((flags & EARLY) != 0) + ((flags & EARLIER) != 0);
+    p.to_count = (flags & EARLY ? 1u : 0u) + (flags & EARLIER ? 1u : 0u);
     if (p.to_count)
         return;
     if (step_hold) {
@@ -545,16 +545,20 @@ bool step_port_drop_after(uint8_t offset)
     return true;
 }
 
-void step_port_shorten(uint8_t offset, uint16_t periods)
+uint16_t step_port_shorten(uint8_t offset, uint16_t periods)
 {
     segment_t *s = &segments[offset / SEGMENT_BYTES];
+    uint32_t dropped = 0;
     step_head = (uint8_t)(offset + SEGMENT_BYTES);
     if (step_tail != step_head) {
+        dropped = counted(s) - periods;
         set_count(s, periods);
     } else if (p.to_count > periods) {
-        set_count(s, counted(s) - (p.to_count - periods));
+        dropped = p.to_count - periods;
+        set_count(s, counted(s) - dropped);
         p.to_count = periods;
     }
+    return (uint16_t)dropped;
 }
 
 uint8_t step_port_lock(void)
