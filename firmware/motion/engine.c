@@ -15,6 +15,7 @@
 #define AHEAD_PERIODS 12u /* of which the last one is where the next segment must be there */
 #define CUT_KEEP_TICKS 16384u    /* motion left to run while a deceleration is planned */
 #define CRUISE_GROUP_TICKS 1600u /* shortest run of a cruise whose interval has a fraction */
+#define STARTED_WITH 6u          /* segments in the ring before the timer runs */
 #define RING_RESERVE 4u          /* segments that one step of emission may need */
 #define STEADY_MOST_GROUPS 12u /* emitted in the short way at a time (ramp.c) */
 #define STEADY_LEAST_Q8 (UNSPLIT_BELOW_TICKS * 256ul) /* of groups too small for an early reload */
@@ -35,7 +36,8 @@ static motion_command_t command; /* being emitted or played */
 static profile_t profile;        /* what is left of it to be emitted */
 static motion_command_t next;    /* taken, not begun */
 static bool next_taken;
-static bool playing; /* the timer runs (it may play silence) */
+static bool playing;  /* the timer runs (it may play silence) */
+static bool starting; /* it will, as soon as the ring is filled a little */
 static stage_t stage;
 static ramp_t ramp;
 static motion_state_t ramp_state; /* the phase that `ramp` was begun for; MOTION_STANDBY: none */
@@ -74,6 +76,18 @@ static bool dir_level(bool ccw)
 static bool is_ccw(const motion_command_t *c)
 {
     return (c->flags & MOTION_CCW) != 0;
+}
+
+/* Segment flags of a command's pulses, and with `turn` those that set the dir pin. */
+static uint8_t direction_flags(const motion_command_t *c, bool turn)
+{
+    uint8_t flags = is_ccw(c) ? 1 << SEGMENT_CCW_BIT : 0;
+    if (turn) {
+        flags |= 1 << SEGMENT_SET_DIR_BIT;
+        if (dir_level(is_ccw(c)))
+            flags |= 1 << SEGMENT_DIR_BIT;
+    }
+    return flags;
 }
 
 void engine_init(void)
@@ -189,11 +203,10 @@ static uint16_t absorb_held(void)
 static void push(uint16_t periods, uint16_t top, bool pulse, motion_state_t state)
 {
     segment_t *s = segment_at(step_head);
-    uint8_t flags = (uint8_t)state;
-    if (tail_awaited)
-        look_for_end();
-    if (is_ccw(&command))
-        flags |= 1 << SEGMENT_CCW_BIT;
+    bool turn = dir_due && periods == 1;
+    uint8_t flags = (uint8_t)(state | direction_flags(&command, turn));
+    dir_due = dir_due && !turn;
+    look_for_end();
     while (pulse && step_held) {
         uint16_t too_many = absorb_held();
         if (too_many >= periods)
@@ -208,12 +221,6 @@ static void push(uint16_t periods, uint16_t top, bool pulse, motion_state_t stat
         periods = (uint16_t)(periods - early_periods(early));
     } else if (early) {
         top = SEGMENT_EARLY_BELOW_TICKS - 1;
-    }
-    if (dir_due && periods == 1) {
-        flags |= 1 << SEGMENT_SET_DIR_BIT;
-        if (dir_level(is_ccw(&command)))
-            flags |= 1 << SEGMENT_DIR_BIT;
-        dir_due = false;
     }
     s->top = top;
     s->match = pulse ? (uint16_t)(top - pulse_width_ticks()) : SEGMENT_SILENT;
@@ -300,27 +307,21 @@ static uint32_t take_carry(uint32_t ticks, uint16_t frac_q8)
     return (uint32_t)((int32_t)ticks + (carry >> 8));
 }
 
-static uint8_t shortest_run(uint16_t ticks)
-{
-    return ticks >= SEGMENT_EARLY_BELOW_TICKS ? 1 : ticks >= SEGMENT_EARLIER_BELOW_TICKS ? 2 : 3;
-}
-
-/* `pulses` intervals, `longer` of them of ticks + 1, the others of ticks. */
+/* `pulses` intervals, `longer` of them of ticks + 1, the others of ticks. Too few of either kind for an early reload are
+ * made like the others, and the difference is carried. */
 static void push_run(uint16_t pulses, uint16_t longer, uint16_t ticks, bool faster, motion_state_t state)
 {
-    uint8_t shortest = shortest_run(ticks);
-    if (longer < shortest && longer != 0) {
-        carry_q8 = (int16_t)(carry_q8 + (int16_t)(longer << 8));
+    uint8_t early = early_periods(early_flags((uint16_t)(ticks - 1)));
+    uint16_t ideal = longer;
+    if (longer <= early)
         longer = 0;
-    } else if (pulses - longer < shortest && longer != pulses) {
-        carry_q8 = (int16_t)(carry_q8 - (int16_t)((pulses - longer) << 8));
+    else if (pulses - longer <= early)
         longer = pulses;
-    }
-    uint16_t shorter = (uint16_t)(pulses - longer);
+    carry_q8 = (int16_t)(carry_q8 + (int16_t)((uint16_t)(ideal - longer) << 8));
     if (faster && longer)
         push(longer, ticks, true, state);
-    if (shorter)
-        push(shorter, (uint16_t)(ticks - 1), true, state);
+    if (pulses != longer)
+        push((uint16_t)(pulses - longer), (uint16_t)(ticks - 1), true, state);
     if (!faster && longer)
         push(longer, ticks, true, state);
 }
@@ -341,11 +342,9 @@ static inline void append(uint16_t periods, uint16_t top, uint16_t width, uint8_
 static void emit_steady(uint32_t *left, uint32_t at_most, bool faster, motion_state_t state)
 {
     uint16_t pulses = ramp.group;
-    uint8_t flags = (uint8_t)state;
+    uint8_t flags = (uint8_t)(state | direction_flags(&command, false));
     uint16_t width = pulse_width_ticks();
     uint16_t longest = (uint16_t)(pulses - 1);
-    if (is_ccw(&command))
-        flags |= 1 << SEGMENT_CCW_BIT;
     /* What may be held meanwhile leaves enough for the groups made here. */
     uint32_t spare = profile_pulses_left() - STEADY_MOST_GROUPS * pulses;
     if (spare < 255) {
@@ -385,16 +384,21 @@ static void emit_steady(uint32_t *left, uint32_t at_most, bool faster, motion_st
     add_pulses(flags, made);
 }
 
+static void begin_ramp(motion_state_t state)
+{
+    if (ramp_state == state)
+        return;
+    ramp_state = state;
+    if (state == MOTION_ACCEL)
+        profile_begin_accel(&profile, &basis, &ramp);
+    else
+        profile_begin_decel(&profile, &basis, &ramp);
+}
+
 /* The next intervals of a ramp. */
 static void emit_ramp(uint32_t *left, uint32_t at_most, motion_state_t state, bool faster)
 {
-    if (ramp_state != state) {
-        ramp_state = state;
-        if (state == MOTION_ACCEL)
-            profile_begin_accel(&profile, &basis, &ramp);
-        else
-            profile_begin_decel(&profile, &basis, &ramp);
-    }
+    begin_ramp(state);
     /* Enough left that held pulses can be given back, and periods that need no early reload. */
     if (ramp.steady && at_most >= 2u * ramp.group && profile_pulses_left() > STEADY_MOST_GROUPS * ramp.group && !step_held &&
         !tail_awaited && !dir_due && carry_q8 >= 0 && (ramp.group >= 4 || ramp.u.harmonic.q8 > STEADY_LEAST_Q8)) {
@@ -412,19 +416,14 @@ static void emit_ramp(uint32_t *left, uint32_t at_most, motion_state_t state, bo
             push(1, (uint16_t)(ticks - 1), true, state);
         return;
     }
-    uint16_t each;
-    uint16_t longer;
+    uint32_t each = ticks;
     if ((pulses & (pulses - 1)) == 0) {
-        uint32_t quotient = ticks;
         for (uint16_t g = pulses; g > 1; g >>= 1)
-            quotient >>= 1;
-        each = (uint16_t)quotient;
-        longer = (uint16_t)((uint16_t)ticks & (pulses - 1));
+            each >>= 1;
     } else {
-        each = (uint16_t)(ticks / pulses);
-        longer = (uint16_t)(ticks - (uint32_t)each * pulses);
+        each /= pulses; /* the last group of a ramp */
     }
-    push_run(pulses, longer, each, faster, state);
+    push_run(pulses, (uint16_t)((uint16_t)ticks - (uint16_t)each * pulses), (uint16_t)each, faster, state);
 }
 
 static void emit_cruise(uint32_t *left, uint32_t at_most)
@@ -471,13 +470,7 @@ static void begin_closing(void)
         chunks = p->cruise.chunks;
         ticks = take_carry(p->cruise.ticks_q8 >> 8, (uint8_t)p->cruise.ticks_q8);
     } else {
-        if (ramp_state != state) {
-            ramp_state = state;
-            if (state == MOTION_ACCEL)
-                profile_begin_accel(p, &basis, &ramp);
-            else
-                profile_begin_decel(p, &basis, &ramp);
-        }
+        begin_ramp(state);
         ramp_time_t sum;
         (void)ramp_next(&ramp, &basis.ramp, 1, &sum);
         ticks = take_carry(sum.ticks, sum.frac);
@@ -515,8 +508,6 @@ static void push_tail(void)
     push(1, (uint16_t)(ticks - 1), false, MOTION_STOP);
     tail_awaited = true;
 }
-
-static bool join_next(void);
 
 /* One step of emission; false if there is nothing to emit. The ring has room for RING_RESERVE segments. */
 static bool emit(void)
@@ -568,8 +559,6 @@ static bool emit(void)
         v_in_play = p->v_exit;
         in_play_cycle_us = p->exit_cycle_us;
         stage = STAGE_GAP;
-        if (next_taken)
-            return join_next();
         return true;
     case STAGE_GAP:
         ramp_state = MOTION_STANDBY;
@@ -612,6 +601,7 @@ static void plan(void)
 static void play(void)
 {
     playing = true;
+    starting = false;
     step_port_start();
 }
 
@@ -636,29 +626,20 @@ static void start_now(void)
 {
     begin_ring();
     step_port_dir(dir_level(is_ccw(&command)));
-    stage = STAGE_LEAD;
-    bool plan_later = may_plan_later();
-    if (plan_later) {
-        /* The first interval is long, whatever the profile: the pulse need not wait for the planning. */
+    if (may_plan_later()) {
         profile.accel_pulses = 0;
         profile.cruise_pulses = 0;
         profile.decel_pulses = 0;
-        emit();
-        emit();
-        ramp_state = MOTION_ACCEL;
+        push(1, (uint16_t)(DIR_SETUP_TICKS + pulse_width_ticks() - 1), true, MOTION_ACCEL);
         push(AHEAD_PERIODS, AHEAD_TICKS / AHEAD_PERIODS - 1, false, MOTION_ACCEL);
-        segment_at(0)->flags |= MOTION_ACCEL;
         ahead_ticks = AHEAD_TICKS;
         play();
-        plan();
-        ramp_state = MOTION_STANDBY;
-        return;
+        stage = STAGE_RUN;
+    } else {
+        stage = STAGE_LEAD;
+        starting = true;
     }
     plan();
-    uint8_t steps = 8;
-    while (steps-- && ring_free() >= RING_RESERVE)
-        emit();
-    play();
 }
 
 /* Is the velocity in play kept until now? */
@@ -677,18 +658,11 @@ static uint32_t wait_ticks(uint32_t us)
 }
 
 /* Lets the command in `next` follow the one that has been emitted. */
-static bool join_next(void)
+static void join_next(void)
 {
     uint32_t wait = wait_ticks(next.start_wait_us);
     bool turns = is_ccw(&next) != is_ccw(&command);
-    uint8_t flags = MOTION_STOP;
-    if (is_ccw(&next))
-        flags |= 1 << SEGMENT_CCW_BIT;
-    if (turns) {
-        flags |= 1 << SEGMENT_SET_DIR_BIT;
-        if (dir_level(is_ccw(&next)))
-            flags |= 1 << SEGMENT_DIR_BIT;
-    }
+    uint8_t flags = (uint8_t)(MOTION_STOP | direction_flags(&next, turns));
     bool joined = false;
     bool waited = false;
     if (tail_valid && wait < SHORTEST_PIECE_TICKS) {
@@ -725,12 +699,11 @@ static bool join_next(void)
         if (step_idle)
             expire_gap();
         start_now();
-        return true;
+        return;
     }
     plan();
     dir_due = waited && turns;
     stage = waited ? STAGE_LEAD : STAGE_RUN;
-    return true;
 }
 
 status_t engine_check(const motion_command_t *c)
@@ -745,22 +718,19 @@ bool engine_can_accept(void)
 
 void engine_submit(const motion_command_t *submitted)
 {
-    if (!playing) {
+    if (!playing && !starting) {
         command = *submitted;
         start_now();
-        return;
+    } else {
+        next = *submitted;
+        next_taken = true;
     }
-    next = *submitted;
-    next_taken = true;
-    if (stage == STAGE_REST || stage == STAGE_END || stage == STAGE_GAP)
-        join_next();
 }
 
 bool engine_poll(void)
 {
     bool worked = false;
-    if (tail_awaited)
-        look_for_end();
+    look_for_end();
     if (step_late) {
         step_late = 0;
         faults |= ENGINE_FAULT_LATE;
@@ -770,11 +740,12 @@ bool engine_poll(void)
             step_port_halt();
             playing = false;
             tail_valid = false;
-            if (tail_awaited) {
-                tail_awaited = false;
-                ended++;
-            }
             expire_gap();
+            if (next_taken) {
+                next_taken = false;
+                command = next;
+                start_now();
+            }
         } else if (step_head != step_tail) {
             /* The planner was so late that the timer ran out of segments: go on where it stopped. */
             faults |= ENGINE_FAULT_STARVED;
@@ -782,8 +753,19 @@ bool engine_poll(void)
         }
         worked = true;
     }
-    if (playing && ring_free() >= RING_RESERVE && emit())
+    if (next_taken && (stage == STAGE_GAP || stage == STAGE_END || stage == STAGE_REST) && playing) {
+        join_next();
         worked = true;
+    }
+    if (playing || starting) {
+        do {
+            if (ring_free() < RING_RESERVE || !emit())
+                break;
+            worked = true;
+        } while (starting && step_head < STARTED_WITH * SEGMENT_BYTES);
+        if (starting)
+            play();
+    }
     if (!playing && pulses_due > 1) {
         /* Single pulses, one at a time: a ring of one pulse. */
         uint8_t top_bit = 15;
@@ -810,6 +792,13 @@ uint8_t engine_commands_ended(void)
     return ended;
 }
 
+/* A command has been begun (its start wait included) and has not ended. */
+static bool running(void)
+{
+    look_for_end();
+    return starting || tail_awaited || (playing && (stage == STAGE_LEAD || stage == STAGE_RUN || stage == STAGE_TAIL));
+}
+
 /* -- stopping ---------------------------------------------------------------------------------------------------- */
 
 static void drop_next(void)
@@ -823,15 +812,16 @@ static void drop_next(void)
 static void halt(void)
 {
     pulses_due = 1;
-    if (!playing)
+    if (!playing && !starting)
         return;
-    step_port_halt();
-    look_for_end();
-    emitted = engine_position();
-    if (stage != STAGE_REST || tail_awaited)
+    if (playing)
+        step_port_halt();
+    if (running())
         ended++;
+    emitted = engine_position();
     tail_awaited = false;
     playing = false;
+    starting = false;
     tail_valid = false;
     silence_chunks = 0;
     piece_ticks = 0;
@@ -851,8 +841,6 @@ void engine_stop(void)
  * by itself now, or it was frozen in the middle of a slow interval or a wait). */
 static uint32_t cut(void)
 {
-    if (!playing || (stage == STAGE_REST && motion_state == MOTION_STANDBY))
-        return 0;
     step_snapshot_t at = step_port_snapshot();
     uint8_t offset = (uint8_t)(at.tail - SEGMENT_BYTES);
     uint16_t left = at.to_count;
@@ -911,15 +899,15 @@ static uint32_t cut(void)
 /* Ends the running command with a deceleration, or none. */
 static void end_command(accel_code_t decel, bool linear)
 {
-    if (!playing || (stage == STAGE_REST && motion_state == MOTION_STANDBY))
+    if (!running())
         return;
     motion_state_t state = engine_state();
     if (state == MOTION_STOP || (state == MOTION_DECEL && decel != ACCEL_NONE))
         return; /* ending already */
-    uint32_t v = cut();
+    uint32_t v = state == MOTION_STANDBY ? 0 : cut();
     if (v == 0) {
-        if (stage == STAGE_RUN || stage == STAGE_LEAD || silence_chunks || piece_ticks) {
-            /* At slow speed or in a wait: there is nothing to ramp down from. */
+        if (state == MOTION_STANDBY || stage == STAGE_RUN || silence_chunks || piece_ticks) {
+            /* In a start wait or at slow speed: there is nothing to ramp down from. */
             halt();
             v_in_play = basis.v_slow;
             in_play_cycle_us = 0;
@@ -955,8 +943,7 @@ void engine_next_graceful(void)
 
 void engine_single_pulse(bool ccw)
 {
-    bool standing = !playing || (stage == STAGE_REST && motion_state == MOTION_STANDBY);
-    if (!standing || next_taken || pulses_due >> 14)
+    if (running() || next_taken || pulses_due >> 14)
         return;
     pulses_due = (uint16_t)(pulses_due << 1 | ccw);
 }
