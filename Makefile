@@ -102,7 +102,9 @@ CHECKS := \
 
 AVR_MCU := -mmcu=atmega328p
 AVR_WARNINGS := -Wall -Wextra -Wconversion -Wshadow -Wlogical-op -Wstrict-prototypes -Wstack-usage=128 -Werror
-AVR_CFLAGS := $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 -Os -g -mcall-prologues -ffunction-sections -fdata-sections -fshort-enums \
+# What makes this image smaller, measured with avr-gcc 5.4 (the last four: 500 bytes).
+AVR_SMALLER := -Os -mcall-prologues -mstrict-X -fno-gcse -fno-move-loop-invariants -fno-ipa-sra
+AVR_CFLAGS := $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 $(AVR_SMALLER) -g -ffunction-sections -fdata-sections -fshort-enums \
     -fstack-usage -Ifirmware $(AVR_WARNINGS)
 # The segment ring stands alone in the first 256 bytes of RAM, so that the step interrupt addresses it with one byte.
 AVR_LDFLAGS := $(AVR_MCU) -Wl,--gc-sections -mrelax -Wl,--section-start=.segments=0x800100 -Wl,-Tdata=0x800200
