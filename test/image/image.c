@@ -187,13 +187,13 @@ static bool still(void)
 void image_idle(uint64_t most_cycles)
 {
     uint64_t end = board_cycle(board) + most_cycles;
-    uint8_t looks = 0;
-    while (looks < 20) {
+    unsigned looks = 0;
+    while (looks < 10 * MS / LOOK) { /* for 10 ms: a command may be in planning */
         if (board_cycle(board) > end)
             image_fail("expected the motor to stand by cycle %" PRIu64 ", it is in state %u after %zu pulses", end,
                        board_peek8(board, state_address), train.count);
         image_run(LOOK);
-        looks = still() ? (uint8_t)(looks + 1) : 0;
+        looks = still() ? looks + 1 : 0;
     }
 }
 
