@@ -3,8 +3,19 @@
 #ifndef REPORT_H
 #define REPORT_H
 
+#ifndef __ASSEMBLER__
 void report_char(char character);
 
 #define UNITY_OUTPUT_CHAR(character) report_char((char)(character))
+
+/* Runs a test whose name lies in flash: there is not enough RAM for all names at once. */
+void report_run(void (*test)(void), const char *name_in_flash, unsigned line);
+
+#define RUN_TEST(test)                                                   \
+    do {                                                                 \
+        static const char name_[] __attribute__((__progmem__)) = #test; \
+        report_run(test, name_, __LINE__);                               \
+    } while (0)
+#endif
 
 #endif

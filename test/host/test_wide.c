@@ -1,0 +1,104 @@
+/* base/wide: 64-bit arithmetic through pointers; the same cases on the host and on the AVR, where it is assembler. */
+#include "base/wide.h"
+#include "unity.h"
+
+void setUp(void)
+{
+}
+
+void tearDown(void)
+{
+}
+
+/* A value for each trial, all lengths from 1 to 64 bits. */
+static uint64_t next_value(uint64_t *state)
+{
+    *state = *state * 6364136223846793005u + 1442695040888963407u;
+    return *state >> (*state >> 58);
+}
+
+/* The parts of the product that reach 64 bits, from 32-bit multiplications. */
+static uint64_t product_of(uint64_t x, uint64_t y)
+{
+    uint32_t x0 = (uint32_t)x, x1 = (uint32_t)(x >> 32);
+    uint32_t y0 = (uint32_t)y, y1 = (uint32_t)(y >> 32);
+    return (uint64_t)x0 * y0 + ((uint64_t)(uint32_t)(x0 * y1 + x1 * y0) << 32);
+}
+
+static void test_sums_and_differences_are_modulo_two_to_the_64(void)
+{
+    uint64_t state = 1;
+    for (uint16_t i = 0; i < 500; i++) {
+        wide_t x = next_value(&state), y = next_value(&state);
+        wide_t sum = x, difference = x;
+        wide_add(&sum, &y);
+        wide_subtract(&difference, &y);
+        TEST_ASSERT_TRUE(sum == x + y);
+        TEST_ASSERT_TRUE(difference == x - y);
+    }
+}
+
+static void test_carries_run_through_all_eight_bytes(void)
+{
+    wide_t x = UINT64_MAX, one = 1;
+    wide_add(&x, &one);
+    TEST_ASSERT_TRUE(x == 0);
+    wide_subtract(&x, &one);
+    TEST_ASSERT_TRUE(x == UINT64_MAX);
+    wide_add(&x, &x);
+    TEST_ASSERT_TRUE(x == UINT64_MAX - 1);
+    wide_subtract(&x, &x);
+    TEST_ASSERT_TRUE(x == 0);
+}
+
+static void test_products_are_modulo_two_to_the_64(void)
+{
+    uint64_t state = 2;
+    for (uint16_t i = 0; i < 500; i++) {
+        wide_t x = next_value(&state), y = next_value(&state), product = 77;
+        wide_multiply(&product, &x, &y);
+        TEST_ASSERT_TRUE(product == product_of(x, y));
+    }
+}
+
+static void test_products_of_negative_numbers_are_right_modulo_two_to_the_64(void)
+{
+    for (int16_t a = -300; a <= 300; a += 37) {
+        for (int16_t b = -300; b <= 300; b += 41) {
+            wide_t x = (wide_t)(int64_t)a, y = (wide_t)(int64_t)b, product;
+            wide_multiply(&product, &x, &y);
+            TEST_ASSERT_TRUE(product == (wide_t)((int64_t)a * b));
+        }
+    }
+}
+
+static void test_a_factor_may_be_multiplied_by_itself(void)
+{
+    wide_t x = 0xFFFFFFFFu, product;
+    wide_multiply(&product, &x, &x);
+    TEST_ASSERT_TRUE(product == 0xFFFFFFFE00000001u);
+}
+
+static void test_32_bits_are_taken_from_any_of_the_lower_bytes(void)
+{
+    wide_t x = 0x8877665544332211u;
+    TEST_ASSERT_EQUAL_HEX32(0x44332211u, (uint32_t)wide_from_byte(&x, 0));
+    TEST_ASSERT_EQUAL_HEX32(0x55443322u, (uint32_t)wide_from_byte(&x, 1));
+    TEST_ASSERT_EQUAL_HEX32(0x66554433u, (uint32_t)wide_from_byte(&x, 2));
+    TEST_ASSERT_EQUAL_HEX32(0x88776655u, (uint32_t)wide_from_byte(&x, 4));
+    x = (wide_t)-1000;
+    TEST_ASSERT_TRUE(wide_from_byte(&x, 0) == -1000);
+    TEST_ASSERT_TRUE(wide_from_byte(&x, 1) == -4);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_sums_and_differences_are_modulo_two_to_the_64);
+    RUN_TEST(test_carries_run_through_all_eight_bytes);
+    RUN_TEST(test_products_are_modulo_two_to_the_64);
+    RUN_TEST(test_products_of_negative_numbers_are_right_modulo_two_to_the_64);
+    RUN_TEST(test_a_factor_may_be_multiplied_by_itself);
+    RUN_TEST(test_32_bits_are_taken_from_any_of_the_lower_bytes);
+    return UNITY_END();
+}
