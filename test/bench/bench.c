@@ -25,8 +25,8 @@ typedef struct {
 } row_t;
 
 static const row_t rows[] = {
-    {"cruise", "step rate kept, exact count: cruise", "pulses of 1 µs, both ports idle, 1,000,000 pulses", "500 kHz",
-     row_cruise_rate},
+    {"cruise", "step rate kept, exact count: cruise",
+     "pulses of 1 µs, both ports idle, 1,000,000 pulses and other counts", "500 kHz", row_cruise_rate},
     {"harmonic", "step rate kept, exact count: both harmonic ramps",
      "a = 10 (the same in pulses with microsteps); terminal receiving at 250 kBd", "200 kHz", row_harmonic_rate},
     {"linear", "step rate kept, exact count: both linear ramps", "500 rad/s²; terminal receiving at 250 kBd", "200 kHz",
