@@ -79,7 +79,7 @@ test_terminal_SRCS := $(CLI_SRCS) firmware/cli/terminal.c firmware/cli/line.c fi
 AVR_TESTS := test_number test_line test_session
 
 # Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
-IMAGE_TESTS := test_image_motion test_image_queue test_image_terminal
+IMAGE_TESTS := test_image_motion test_image_queue test_image_terminal test_image_stop
 # What every whole-image test is linked with.
 IMAGE_COMMON_SRCS := test/image/image.c test/image/model.c
 
