@@ -33,6 +33,24 @@ step_idle:    .skip 1
 step_late:    .skip 1
 motion_state: .skip 1
 
+/* Counters, tail, dir and state for the segment at Z, which has been loaded or is about to be. */
+.macro account
+        ldd     r24, Z + 4
+        out     io(GPIOR0), r24
+        ldd     r24, Z + 5
+        out     io(GPIOR1), r24
+        mov     r24, r30
+        subi    r24, -SEGMENT_BYTES
+        sts     step_tail, r24
+        lds     r24, step_flags
+        sbrc    r24, SEGMENT_SET_DIR_BIT
+        rcall   set_dir
+        ldd     r24, Z + 6
+        sts     step_flags, r24
+        andi    r24, SEGMENT_STATE_MASK
+        sts     motion_state, r24
+.endm
+
         .section .text.step_isr, "ax", @progbits
         .global TIMER1_OVF_vect
         .type TIMER1_OVF_vect, @function
@@ -64,19 +82,37 @@ segment_over:
         ldi     r31, hi8(segments)
         lds     r24, step_head
         cp      r24, r30
-        breq    ring_empty
+        brne    1f
+        rjmp    ring_empty
+1:
         lds     r24, step_flags
         sbrs    r24, SEGMENT_EARLY_BIT
         rjmp    load
         /* Too short a period to reload in: the count ended early, and the periods still due are waited for here. */
-wait_period:
-        sbis    io(TIFR1), TOV1
-        rjmp    wait_period
+2:      sbis    io(TIFR1), TOV1
+        rjmp    2b
         sbi     io(TIFR1), TOV1         /* clears the flag, and only this one (datasheet 14.4.3) */
         sbrs    r24, SEGMENT_EARLIER_BIT
         rjmp    load
-        andi    r24, ~(1 << SEGMENT_EARLIER_BIT)
-        rjmp    wait_period
+        /* Two periods early: what is left to do after the second wait must be over before the period after next. */
+        account
+3:      sbis    io(TIFR1), TOV1
+        rjmp    3b
+        sbi     io(TIFR1), TOV1
+        ldd     r24, Z + 1
+        sts     OCR1AH, r24
+        ldd     r24, Z + 0
+        sts     OCR1AL, r24
+        ldd     r24, Z + 3
+        sts     OCR1BH, r24
+        ldd     r24, Z + 2
+        sts     OCR1BL, r24
+        sbic    io(TIFR1), TOV1
+        rjmp    late
+leave:
+        pop     r31
+        pop     r30
+        rjmp    return
 
 load:
         ldd     r24, Z + 1
@@ -88,25 +124,16 @@ load:
         ldd     r24, Z + 2
         sts     OCR1BL, r24
         sbic    io(TIFR1), TOV1
-        rjmp    late
-loaded:
-        ldd     r24, Z + 4
-        out     io(GPIOR0), r24
-        ldd     r24, Z + 5
-        out     io(GPIOR1), r24
-        lds     r24, step_flags
-        sbrc    r24, SEGMENT_SET_DIR_BIT
-        rcall   set_dir
-        ldd     r24, Z + 6
-        sts     step_flags, r24
-        andi    r24, SEGMENT_STATE_MASK
-        sts     motion_state, r24
-        subi    r30, -SEGMENT_BYTES
-        sts     step_tail, r30
-leave:
-        pop     r31
-        pop     r30
-        rjmp    return
+        rjmp    account_late
+        account
+        rjmp    leave
+
+account_late:
+        account
+late:
+        ldi     r24, 1
+        sts     step_late, r24
+        rjmp    leave
 
         /* dir belongs to the segment whose only period has just begun: the last pulse before it has fallen. */
 set_dir:
@@ -115,11 +142,6 @@ set_dir:
         sbrs    r24, SEGMENT_DIR_BIT
         cbi     io(PORTB), 5
         ret
-
-late:
-        ldi     r24, 1
-        sts     step_late, r24
-        rjmp    loaded
 
 ring_empty:
         ldi     r31, 0
@@ -138,7 +160,9 @@ ring_empty:
         inc     r24
         out     io(GPIOR0), r24
         tst     r24
-        brne    leave
+        breq    1f
+        rjmp    leave
+1:
         /* Planned motion is not over but the planner is behind: repeat the interval, so that no pulse is lost. */
         lds     r24, step_hold
         subi    r24, 1

@@ -11,11 +11,12 @@
 #define TAIL_TICKS 320u          /* the end of the closing interval, on which a following command is joined */
 #define SHORTEST_PIECE_TICKS 128u
 #define SILENCE_MAX_PERIODS 65000u
-#define AHEAD_TICKS 49152u /* silence begun before a profile is planned: 3 ms */
-#define AHEAD_PERIODS 12u /* of which the last one is where the next segment must be there */
+#define AHEAD_TICKS 24576u       /* silence begun before a profile with ramps is planned: 1.5 ms */
+#define AHEAD_SHORT_TICKS 6144u  /* and one without acceleration */
+#define AHEAD_PERIODS 12u        /* they last; when the last one begins, the next segment must be there */
 #define CUT_KEEP_TICKS 16384u    /* motion left to run while a deceleration is planned */
 #define CRUISE_GROUP_TICKS 1600u /* shortest run of a cruise whose interval has a fraction */
-#define STARTED_WITH 6u          /* segments in the ring before the timer runs */
+#define STARTED_WITH 3u          /* segments in the ring before the timer runs */
 #define RING_RESERVE 4u          /* segments that one step of emission may need */
 #define STEADY_MOST_GROUPS 12u /* emitted in the short way at a time (ramp.c) */
 #define STEADY_LEAST_Q8 (UNSPLIT_BELOW_TICKS * 256ul) /* of groups too small for an early reload */
@@ -36,8 +37,7 @@ static motion_command_t command; /* being emitted or played */
 static profile_t profile;        /* what is left of it to be emitted */
 static motion_command_t next;    /* taken, not begun */
 static bool next_taken;
-static bool playing;  /* the timer runs (it may play silence) */
-static bool starting; /* it will, as soon as the ring is filled a little */
+static bool playing; /* the timer runs (it may play silence) */
 static stage_t stage;
 static ramp_t ramp;
 static motion_state_t ramp_state; /* the phase that `ramp` was begun for; MOTION_STANDBY: none */
@@ -46,7 +46,7 @@ static uint32_t silence_chunks;  /* still to be emitted before ... */
 static uint16_t piece_ticks;     /* ... this period; 0: none */
 static bool piece_pulse;
 static int16_t carry_q8;         /* 1/256 ticks rounded off so far */
-static uint32_t ahead_ticks;     /* part of the next interval that has been emitted as silence */
+static uint16_t ahead_ticks;     /* part of the next interval that has been emitted as silence */
 static bool dir_due;             /* the next single period sets the dir pin */
 static profile_interval_t closing; /* of the last command emitted */
 static uint8_t tail_offset;      /* its tail segment, while stage is REST, GAP or END */
@@ -601,24 +601,31 @@ static void plan(void)
 static void play(void)
 {
     playing = true;
-    starting = false;
     step_port_start();
 }
 
-/* From standstill the first interval of a ramp is long, whatever the profile turns out to be: the first pulse need not
- * wait for the planning. True where that is certain, with few operations. */
-static bool may_plan_later(void)
+/* The first interval of most profiles is long, whatever the rest turns out to be: then the first pulse need not wait for
+ * the planning. Returns how much of that interval may certainly be begun, from few operations; 0: plan first. */
+static uint16_t certain_ticks(void)
 {
+    if (v_in_play != basis.v_slow || command.start_wait_us != 0)
+        return 0;
+    if (command.accel == ACCEL_NONE) /* the cruise interval */
+        return command.flags & MOTION_CYCLE && command.velocity >> basis.factor_log2 >= AHEAD_SHORT_TICKS / 8
+                   ? AHEAD_SHORT_TICKS
+                   : 0;
     uint32_t v_target = profile_rpm(&basis, &command) * 100u << basis.factor_log2;
     uint32_t accel = accel_centi(command.accel);
-    if (v_in_play != basis.v_slow || command.accel == ACCEL_NONE || command.start_wait_us != 0 ||
-        basis.slow_ticks < AHEAD_TICKS + SHORTEST_PIECE_TICKS || v_target <= basis.v_slow)
-        return false;
-    if (!(command.flags & MOTION_LINEAR))
-        return (v_target - basis.v_slow) >> basis.factor_log2 >= accel; /* at least one step at slow speed */
-    /* c0 = sqrt(3.217e17 / (sprf * F * centi)) ticks; at least one step from 100 RPM on with 200 steps and more */
-    return basis.steps_per_rev >= 200 && v_target >> basis.factor_log2 >= 10000u && command.accel == command.decel &&
-           accel <= (130000000u >> basis.factor_log2) / basis.steps_per_rev;
+    if (basis.slow_ticks < AHEAD_TICKS + SHORTEST_PIECE_TICKS || v_target <= basis.v_slow)
+        return 0;
+    bool certain;
+    if (!(command.flags & MOTION_LINEAR)) /* at least one step at slow speed */
+        certain = (v_target - basis.v_slow) >> basis.factor_log2 >= accel;
+    else /* c0 = sqrt(3.217e17 / (sprf * F * centi)) ticks; at least one step from 100 RPM on with 200 steps and more */
+        certain = basis.steps_per_rev >= 200 && v_target >> basis.factor_log2 >= 10000u &&
+                  command.accel == command.decel &&
+                  accel <= (400000000u >> basis.factor_log2) / basis.steps_per_rev;
+    return certain ? AHEAD_TICKS : 0;
 }
 
 /* Starts the command, which is not planned yet, from standstill. */
@@ -626,20 +633,25 @@ static void start_now(void)
 {
     begin_ring();
     step_port_dir(dir_level(is_ccw(&command)));
-    if (may_plan_later()) {
-        profile.accel_pulses = 0;
-        profile.cruise_pulses = 0;
-        profile.decel_pulses = 0;
-        push(1, (uint16_t)(DIR_SETUP_TICKS + pulse_width_ticks() - 1), true, MOTION_ACCEL);
-        push(AHEAD_PERIODS, AHEAD_TICKS / AHEAD_PERIODS - 1, false, MOTION_ACCEL);
-        ahead_ticks = AHEAD_TICKS;
-        play();
+    uint8_t flags = (uint8_t)(MOTION_ACCEL | direction_flags(&command, false));
+    uint16_t certain = certain_ticks();
+    stage = STAGE_LEAD;
+    if (command.start_wait_us == 0) {
+        append(1, (uint16_t)(DIR_SETUP_TICKS + pulse_width_ticks() - 1), pulse_width_ticks(), flags);
+        add_pulses(flags, 1);
         stage = STAGE_RUN;
-    } else {
-        stage = STAGE_LEAD;
-        starting = true;
+    }
+    if (certain) {
+        append(AHEAD_PERIODS, (uint16_t)(certain / AHEAD_PERIODS - 1), 0, flags);
+        segment_at(SEGMENT_BYTES)->match = SEGMENT_SILENT;
+        ahead_ticks = certain;
+        play();
     }
     plan();
+    while (!playing && step_head < STARTED_WITH * SEGMENT_BYTES && emit())
+        ;
+    if (!playing)
+        play();
 }
 
 /* Is the velocity in play kept until now? */
@@ -718,7 +730,7 @@ bool engine_can_accept(void)
 
 void engine_submit(const motion_command_t *submitted)
 {
-    if (!playing && !starting) {
+    if (!playing) {
         command = *submitted;
         start_now();
     } else {
@@ -757,14 +769,13 @@ bool engine_poll(void)
         join_next();
         worked = true;
     }
-    if (playing || starting) {
+    /* Until the ring is half full nothing else is as urgent; then a step at a time. */
+    if (playing) {
         do {
             if (ring_free() < RING_RESERVE || !emit())
                 break;
             worked = true;
-        } while (starting && step_head < STARTED_WITH * SEGMENT_BYTES);
-        if (starting)
-            play();
+        } while (ring_free() > SEGMENT_COUNT / 2);
     }
     if (!playing && pulses_due > 1) {
         /* Single pulses, one at a time: a ring of one pulse. */
@@ -796,7 +807,7 @@ uint8_t engine_commands_ended(void)
 static bool running(void)
 {
     look_for_end();
-    return starting || tail_awaited || (playing && (stage == STAGE_LEAD || stage == STAGE_RUN || stage == STAGE_TAIL));
+    return tail_awaited || (playing && (stage == STAGE_LEAD || stage == STAGE_RUN || stage == STAGE_TAIL));
 }
 
 /* -- stopping ---------------------------------------------------------------------------------------------------- */
@@ -812,16 +823,14 @@ static void drop_next(void)
 static void halt(void)
 {
     pulses_due = 1;
-    if (!playing && !starting)
+    if (!playing)
         return;
-    if (playing)
-        step_port_halt();
+    step_port_halt();
     if (running())
         ended++;
     emitted = engine_position();
     tail_awaited = false;
     playing = false;
-    starting = false;
     tail_valid = false;
     silence_chunks = 0;
     piece_ticks = 0;

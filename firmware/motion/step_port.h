@@ -15,7 +15,7 @@ void step_port_dir(bool level);
 
 /* Begins to play the ring, which holds at least one segment, after a short silent lead of STEP_PORT_LEAD_TICKS. */
 void step_port_start(void);
-#define STEP_PORT_LEAD_TICKS 64u
+#define STEP_PORT_LEAD_TICKS 16u
 
 /* Stops the timer at once, except that a pulse which has begun or is about to is completed first. No edge comes after
  * the return; step_port_snapshot() then tells where it stopped. */
