@@ -1,0 +1,299 @@
+/* motion/ramp: intervals and their sums. The table's sums come from motion_exact, which the host checks; the AVR runs
+ * the same ramps against the same sums. */
+#include "motion/profile.h"
+#include "motion/ramp.h"
+#include "unity.h"
+
+#ifdef __AVR__
+#include <avr/pgmspace.h>
+#define TABLE PROGMEM
+#define table_copy(to, from) memcpy_P((to), (from), sizeof *(to))
+#else
+#include <math.h>
+#include <stdio.h>
+#include "host/motion_exact.h"
+#define TABLE
+#define table_copy(to, from) (*(to) = *(from))
+#endif
+
+#define SLOW_RPM 10
+
+static ramp_constants_t constants;
+static ramp_t ramp;
+
+void setUp(void)
+{
+    ramp_constants(&constants, 200);
+}
+
+void tearDown(void)
+{
+}
+
+typedef struct {
+    uint8_t linear, faster; /* linear and slower: to a stop */
+    uint8_t factor_log2;
+    uint16_t rpm; /* at the first pulse; 0: from standstill, or to a stop */
+    uint16_t centi;
+    uint16_t pulses;
+    uint32_t ticks; /* sum of the intervals */
+} case_t;
+
+static const case_t cases[] TABLE = {
+    {0, 1, 0, 10, 100, 90, 11272364},
+    {0, 1, 0, 10, 50, 180, 22322796},
+    {0, 1, 0, 10, 1000, 500, 3260555},
+    {0, 0, 0, 100, 100, 90, 10840364},
+    {0, 1, 0, 10, 33, 2000, 61396903},
+    {0, 1, 3, 10, 100, 720, 11079470},
+    {0, 1, 4, 10, 1000, 4000, 2667314},
+    {0, 0, 4, 640, 250, 3900, 5831471},
+    {0, 1, 0, 10, 9999, 50, 687753},
+    {0, 1, 0, 1000, 7, 5000, 20579223},
+    {0, 0, 0, 3000, 500, 590, 3884170},
+    {0, 1, 7, 10, 999, 12000, 2188165},
+    {1, 1, 0, 0, 1047, 166, 15969474},
+    {1, 0, 0, 0, 1047, 166, 15176597},
+    {1, 1, 0, 0, 500, 893, 53598254},
+    {1, 0, 0, 0, 500, 893, 51931060},
+    {1, 1, 0, 0, 50000, 20000, 25365295},
+    {1, 0, 0, 0, 50000, 20000, 25365295},
+    {1, 1, 4, 0, 2500, 10000, 20053026},
+    {1, 0, 4, 0, 2500, 10000, 19717943},
+    {1, 1, 7, 0, 9999, 30000, 6140267},
+    {1, 0, 7, 0, 9999, 30000, 6056488},
+    {1, 1, 0, 0, 10, 40, 80212105},
+    {1, 0, 0, 0, 10, 40, 19200000},
+    {1, 1, 0, 0, 60000, 1, 163732},
+};
+#define CASES (sizeof cases / sizeof cases[0])
+
+static void begin(const case_t *c)
+{
+    uint16_t factor = (uint16_t)(1u << c->factor_log2);
+    if (!c->linear) {
+        ramp_begin_harmonic(&ramp, &constants, (uint32_t)c->rpm * 100u * factor, c->centi, c->faster, UINT32_MAX >> 1);
+        return;
+    }
+    wide_t c_q8, t = 0, rest = 0;
+    ramp_linear_c(&c_q8, 200, c->factor_log2, c->centi);
+    if (!c->faster)
+        ramp_linear_time(&t, &c_q8, c->pulses, &rest);
+    ramp_begin_linear(&ramp, &c_q8, &t, &rest, c->faster, 4800000u / SLOW_RPM / factor);
+}
+
+/* The sum of the ramp's intervals in 1/256 ticks. */
+static uint64_t run(uint32_t pulses)
+{
+    uint64_t sum_q8 = 0;
+    while (pulses) {
+        ramp_time_t sum;
+        uint16_t group = ramp_next(&ramp, &constants, pulses, &sum);
+        TEST_ASSERT_TRUE(group >= 1 && group <= pulses);
+        pulses -= group;
+        sum_q8 += ((uint64_t)sum.ticks << 8) + sum.frac;
+    }
+    return sum_q8;
+}
+
+/* HAR-002, HAR-003, HAR-019, LIN-001, LIN-002, LIN-020 */
+static void test_ramps_take_the_time_that_their_law_says(void)
+{
+    for (uint8_t i = 0; i < CASES; i++) {
+        case_t c;
+        table_copy(&c, &cases[i]);
+        begin(&c);
+        uint32_t ticks = (uint32_t)((run(c.pulses) + 128) >> 8);
+        uint32_t allowed = 1u + c.pulses / 1000u;
+        TEST_ASSERT_UINT32_WITHIN_MESSAGE(allowed, c.ticks, ticks, "ticks of a case");
+    }
+}
+
+/* The order in which a ramp is asked for does not matter: the engine takes the last interval by itself. */
+static void test_pieces_of_a_ramp_add_up_to_the_whole(void)
+{
+    for (uint8_t i = 0; i < CASES; i++) {
+        case_t c;
+        table_copy(&c, &cases[i]);
+        if (c.pulses < 40)
+            continue;
+        begin(&c);
+        uint64_t sum_q8 = run(17);
+        sum_q8 += run(c.pulses - 18u);
+        sum_q8 += run(1);
+        uint32_t allowed = 1u + c.pulses / 1000u;
+        TEST_ASSERT_UINT32_WITHIN(allowed, c.ticks, (uint32_t)((sum_q8 + 128) >> 8));
+    }
+}
+
+/* HAR-010, HAR-011, SLO-001 */
+static void test_the_interval_at_a_speed_is_300000_us_by_rpm(void)
+{
+    ramp_time_t t = ramp_interval(&constants, 1000);
+    TEST_ASSERT_EQUAL_UINT32(480000, t.ticks);
+    TEST_ASSERT_EQUAL_UINT8(0, t.frac);
+    t = ramp_interval(&constants, 15000); /* 150 RPM: 2000 us */
+    TEST_ASSERT_EQUAL_UINT32(32000, t.ticks);
+    t = ramp_interval(&constants, 7000); /* 70 RPM: 4285.714 us = 68571.43 ticks */
+    TEST_ASSERT_EQUAL_UINT32(68571, t.ticks);
+    TEST_ASSERT_UINT32_WITHIN(1, 110, t.frac);
+}
+
+static void test_speed_and_interval_are_each_others_inverse(void)
+{
+    for (uint32_t v = 1000; v < 15000000; v += v / 7) {
+        ramp_time_t t = ramp_interval(&constants, v);
+        uint32_t back = ramp_velocity(&constants, t.ticks + (t.frac >= 128));
+        /* Half a tick and the 24 bits of a float. */
+        TEST_ASSERT_UINT32_WITHIN(1 + v / t.ticks + (v >> 22), v, back);
+    }
+}
+
+/* LIN-003, LIN-010, LIN-017 */
+static void test_the_linear_constant_follows_motor_and_acceleration(void)
+{
+    /* C = 2 * (2 pi / 200) / 10.47 * 256e12 ticks^2 = 1.536289e12 */
+    wide_t c, other;
+    ramp_linear_c(&c, 200, 0, 1047);
+    TEST_ASSERT_UINT32_WITHIN(1, 1536289, (uint32_t)((c >> 8) / 1000000u));
+    ramp_linear_c(&other, 400, 0, 1047);
+    TEST_ASSERT_TRUE(2 * other <= c + 16 && c <= 2 * other + 16);
+    ramp_linear_c(&other, 200, 4, 1047);
+    TEST_ASSERT_TRUE(other == c / 16);
+}
+
+static void test_the_time_of_a_pulse_is_an_exact_root(void)
+{
+    wide_t c, t, rest;
+    for (uint16_t centi = 1; centi < 60000; centi = (uint16_t)(centi * 3 + 1)) {
+        for (uint32_t n = 1; n < 2000000; n = n * 5 + 3) {
+            ramp_linear_c(&c, 200, 0, centi);
+            ramp_linear_time(&t, &c, n, &rest);
+            /* n C = t^2 + rest, modulo 2^64, and no nearer root */
+            TEST_ASSERT_TRUE(t * t + rest == n * c);
+            int64_t off = (int64_t)rest;
+            TEST_ASSERT_TRUE(off <= (int64_t)(2 * t) && off >= -(int64_t)(2 * t));
+        }
+    }
+}
+
+#ifndef __AVR__
+static void exact_of(exact_ramp_t *law, const case_t *c)
+{
+    exact_motor_t motor = {.steps_per_rev = 200, .factor = 1u << c->factor_log2, .slow_rpm = SLOW_RPM};
+    if (c->linear && !c->faster)
+        exact_decel(law, &motor, c->pulses, 0, c->centi, true);
+    else
+        exact_accel(law, &motor, c->rpm, c->rpm == 0, c->faster, 0, c->centi, c->linear);
+}
+
+static void test_the_sums_of_the_table_are_those_of_the_law(void)
+{
+    for (size_t i = 0; i < CASES; i++) {
+        exact_ramp_t law;
+        exact_of(&law, &cases[i]);
+        TEST_ASSERT_EQUAL_UINT32((uint32_t)llroundl(exact_ramp_time(&law, cases[i].pulses)), cases[i].ticks);
+    }
+}
+
+static void test_the_law_in_closed_form_is_the_sum_of_its_intervals(void)
+{
+    for (size_t i = 0; i < CASES; i++) {
+        exact_ramp_t law;
+        exact_of(&law, &cases[i]);
+        long double sum = 0;
+        for (uint32_t k = 0; k < cases[i].pulses; k++)
+            sum += exact_ramp_interval(&law, k);
+        TEST_ASSERT_DOUBLE_WITHIN(0.001, (double)sum, (double)exact_ramp_time(&law, cases[i].pulses));
+    }
+}
+
+/* Each pulse against its own interval of the law: 0.1 % or one tick, 0.03 % in the mean square. */
+static void assert_intervals(const case_t *c)
+{
+    exact_ramp_t law;
+    exact_of(&law, c);
+    begin(c);
+    uint32_t k = 0;
+    long double squares = 0;
+    while (k < c->pulses) {
+        ramp_time_t sum;
+        uint16_t group = ramp_next(&ramp, &constants, c->pulses - k, &sum);
+        long double mean = (sum.ticks + sum.frac / 256.0L) / group;
+        for (uint16_t i = 0; i < group; i++, k++) {
+            long double exact = exact_ramp_interval(&law, k);
+            long double off = fabsl(mean - exact);
+            if (off > 1.0L && off > exact / 1000.0L) {
+                char text[160];
+                snprintf(text, sizeof text, "l%u a%.2f, %u RPM, factor %u, pulse %u: %.3Lf, exact %.3Lf", c->linear,
+                         c->centi / 100.0, c->rpm, 1u << c->factor_log2, k, mean, exact);
+                TEST_FAIL_MESSAGE(text);
+            }
+            off = off > 1.0L ? off / exact : 0;
+            squares += off * off;
+        }
+    }
+    TEST_ASSERT_TRUE(sqrtl(squares / c->pulses) <= 0.0003L);
+}
+
+/* HAR-002, HAR-013, LIN-001, SLO-005 */
+static void test_every_interval_of_usual_ramps_is_within_a_thousandth_or_one_tick(void)
+{
+    static const uint16_t harmonic[] = {10, 50, 100, 125, 250, 333, 500, 800, 1000};
+    static const uint16_t linear[] = {100, 500, 1047, 2500, 5000, 12000, 25000, 50000};
+    for (uint8_t factor_log2 = 0; factor_log2 < 5; factor_log2++) {
+        uint32_t top_rpm = 60000u >> factor_log2; /* 200 kHz */
+        for (size_t i = 0; i < sizeof harmonic / sizeof harmonic[0]; i++) {
+            uint32_t pulses = ((top_rpm - SLOW_RPM) * 100u << factor_log2) / harmonic[i];
+            pulses = pulses > 60000u ? 60000u : pulses;
+            case_t c = {.faster = 1, .factor_log2 = factor_log2, .rpm = SLOW_RPM, .centi = harmonic[i],
+                        .pulses = (uint16_t)pulses};
+            assert_intervals(&c);
+            c.faster = 0;
+            c.rpm = (uint16_t)(SLOW_RPM + ((pulses - 1) * harmonic[i] / 100u >> factor_log2));
+            c.pulses = (uint16_t)((((uint32_t)c.rpm - SLOW_RPM) * 100u << factor_log2) / harmonic[i]);
+            assert_intervals(&c);
+        }
+        for (size_t i = 0; i < sizeof linear / sizeof linear[0]; i++) {
+            if ((uint32_t)linear[i] << factor_log2 > 50000u)
+                continue; /* steeper in pulses: shares intervals more widely */
+            case_t c = {.linear = 1, .faster = 1, .factor_log2 = factor_log2, .centi = linear[i], .pulses = 40000};
+            assert_intervals(&c);
+            c.faster = 0;
+            assert_intervals(&c);
+        }
+    }
+}
+
+/* LIN-018 */
+static void test_axes_whose_speed_and_acceleration_are_scaled_alike_arrive_together(void)
+{
+    /* 100 RPM at 10.47 and 50 RPM at 5.235 (5.24): ramps of 166 and 83 steps. */
+    case_t fast = {.linear = 1, .faster = 1, .centi = 1047, .pulses = 166};
+    case_t slow = {.linear = 1, .faster = 1, .centi = 524, .pulses = 83};
+    begin(&fast);
+    uint64_t one = run(fast.pulses);
+    begin(&slow);
+    uint64_t other = run(slow.pulses);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 1.0, (double)one / (double)other);
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, 1.0, (double)one / 256.0 / 16e6);
+}
+#endif
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_ramps_take_the_time_that_their_law_says);
+    RUN_TEST(test_pieces_of_a_ramp_add_up_to_the_whole);
+    RUN_TEST(test_the_interval_at_a_speed_is_300000_us_by_rpm);
+    RUN_TEST(test_speed_and_interval_are_each_others_inverse);
+    RUN_TEST(test_the_linear_constant_follows_motor_and_acceleration);
+    RUN_TEST(test_the_time_of_a_pulse_is_an_exact_root);
+#ifndef __AVR__
+    RUN_TEST(test_the_sums_of_the_table_are_those_of_the_law);
+    RUN_TEST(test_the_law_in_closed_form_is_the_sum_of_its_intervals);
+    RUN_TEST(test_every_interval_of_usual_ramps_is_within_a_thousandth_or_one_tick);
+    RUN_TEST(test_axes_whose_speed_and_acceleration_are_scaled_alike_arrive_together);
+#endif
+    return UNITY_END();
+}
