@@ -60,7 +60,7 @@ static void run_planner(run_t *run, size_t pulses, load_t *load)
                        << 1);
         uint64_t began = board_cycle(run->board);
         uint64_t isr = isr_cycles(run);
-        if (board_run_to_pc(run->board, back, TICKS_PER_S / 100) != BOARD_MATCHED)
+        if (board_run_to_pc(run->board, back, 10 * TICKS_PER_S) != BOARD_MATCHED)
             die("engine_poll does not return");
         if (board_peek8(run->board, R24))
             load->planner += board_cycle(run->board) - began - (isr_cycles(run) - isr);

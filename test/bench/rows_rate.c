@@ -48,9 +48,10 @@ static bool cruise_kept(result_t *result, const rate_t *rate, unsigned pulses)
     run_until_quiet(&run, TICKS_PER_S / 2, 60 * TICKS_PER_S);
     uint64_t off = grid_error(&run, rate_ticks(rate));
     report_t report = run_report(&run);
+    bool exact = off == 0 || pulses <= STRETCHED_PULSES;
     bool kept =
-        run.pulses == pulses && off == 0 && run.bad_widths == 0 && report.faults == 0 && report.position == (int)pulses;
-    if (!kept)
+        run.pulses == pulses && exact && run.bad_widths == 0 && report.faults == 0 && report.position == (int)pulses;
+    if (!kept || off)
         detail(result,
                "- %g kHz: %zu of %u pulses, %llu ticks off the grid, %zu pulses of a wrong length, faults %u, "
                "position %d%s\n",
