@@ -61,6 +61,7 @@ static uint8_t faults;
 static bool gap_on = true;
 static uint32_t v_in_play;
 static uint32_t in_play_cycle_us; /* 0: follows from v_in_play */
+static bool single;               /* the ring plays single pulses */
 static uint16_t pulses_due;       /* single pulses waiting: bits below the highest one set, 1 = CCW, oldest on top */
 
 static uint16_t pulse_width_ticks(void)
@@ -234,11 +235,11 @@ static void push(uint16_t periods, uint16_t top, bool pulse, motion_state_t stat
     step_port_unlock(lock);
 }
 
-static int16_t signed_pulses(const segment_t *s, uint16_t pulses)
+static int32_t signed_pulses(const segment_t *s, uint16_t pulses)
 {
     if (is_silent(s))
         return 0;
-    return s->flags & (1 << SEGMENT_CCW_BIT) ? (int16_t)-pulses : (int16_t)pulses;
+    return s->flags & (1 << SEGMENT_CCW_BIT) ? -(int32_t)pulses : (int32_t)pulses;
 }
 
 /* Pulses in the segments from `offset` on, clockwise positive. */
@@ -247,8 +248,7 @@ static int32_t pulses_from(uint8_t offset)
     int32_t pulses = 0;
     while (offset != step_head) {
         const segment_t *s = segment_at(offset);
-        int16_t some = signed_pulses(s, (uint16_t)(counted_periods(s) + early_periods(s->flags)));
-        pulses += some;
+        pulses += signed_pulses(s, (uint16_t)(counted_periods(s) + early_periods(s->flags)));
         offset = (uint8_t)(offset + SEGMENT_BYTES);
     }
     return pulses;
@@ -389,6 +389,7 @@ static void begin_ramp(motion_state_t state)
     if (ramp_state == state)
         return;
     ramp_state = state;
+    ramp.steady = 0;
     if (state == MOTION_ACCEL)
         profile_begin_accel(&profile, &basis, &ramp);
     else
@@ -590,6 +591,7 @@ static void begin_ring(void)
     piece_ticks = 0;
     dir_due = false;
     tail_valid = false;
+    single = false;
     ramp_state = MOTION_STANDBY;
 }
 
@@ -608,7 +610,7 @@ static void play(void)
  * the planning. Returns how much of that interval may certainly be begun, from few operations; 0: plan first. */
 static uint16_t certain_ticks(void)
 {
-    if (v_in_play != basis.v_slow || command.start_wait_us != 0)
+    if (v_in_play != basis.v_slow)
         return 0;
     if (command.accel == ACCEL_NONE) /* the cruise interval */
         return command.flags & MOTION_CYCLE && command.velocity >> basis.factor_log2 >= AHEAD_SHORT_TICKS / 8
@@ -635,16 +637,24 @@ static void start_now(void)
     step_port_dir(dir_level(is_ccw(&command)));
     uint8_t flags = (uint8_t)(MOTION_ACCEL | direction_flags(&command, false));
     uint16_t certain = certain_ticks();
-    stage = STAGE_LEAD;
-    if (command.start_wait_us == 0) {
-        append(1, (uint16_t)(DIR_SETUP_TICKS + pulse_width_ticks() - 1), pulse_width_ticks(), flags);
+    if (command.start_wait_us < 4096u) {
+        uint16_t lead = (uint16_t)(command.start_wait_us * TICKS_PER_US);
+        if (lead < DIR_SETUP_TICKS + pulse_width_ticks())
+            lead = (uint16_t)(DIR_SETUP_TICKS + pulse_width_ticks());
+        append(1, (uint16_t)(lead - 1), pulse_width_ticks(), flags);
         add_pulses(flags, 1);
         stage = STAGE_RUN;
-    }
-    if (certain) {
-        append(AHEAD_PERIODS, (uint16_t)(certain / AHEAD_PERIODS - 1), 0, flags);
-        segment_at(SEGMENT_BYTES)->match = SEGMENT_SILENT;
-        ahead_ticks = certain;
+        if (certain) {
+            append(AHEAD_PERIODS, (uint16_t)(certain / AHEAD_PERIODS - 1), 0, flags);
+            segment_at(SEGMENT_BYTES)->match = SEGMENT_SILENT;
+            ahead_ticks = certain;
+            play();
+        }
+    } else {
+        stage = STAGE_LEAD;
+        emit(); /* sets the interval up, then its silence, then the pulse */
+        emit();
+        emit();
         play();
     }
     plan();
@@ -739,6 +749,32 @@ void engine_submit(const motion_command_t *submitted)
     }
 }
 
+/* Single pulses need no plan: each is a segment, and the silence behind the last one is taken back for the next. */
+static bool play_single_pulses(void)
+{
+    if (!single)
+        begin_ring();
+    else if (playing && !step_port_drop_after(tail_offset))
+        return false; /* just over: they start anew when it is idle */
+    stage = STAGE_REST;
+    single = true;
+    while (pulses_due > 1 && ring_free() >= RING_RESERVE) {
+        uint16_t newest = pulses_due;
+        uint8_t older = 0;
+        while (newest >> (older + 1) > 1)
+            older++;
+        command.flags = (newest >> older) & 1 ? MOTION_CCW : 0;
+        pulses_due = (uint16_t)((newest & ((1u << older) - 1)) | 1u << older);
+        dir_due = true;
+        tail_offset = step_head;
+        push(1, (uint16_t)(SHORTEST_PIECE_TICKS + pulse_width_ticks() - 1), true, MOTION_STANDBY);
+    }
+    push(1, SHORTEST_PIECE_TICKS - 1, false, MOTION_STANDBY);
+    if (!playing)
+        play();
+    return true;
+}
+
 bool engine_poll(void)
 {
     bool worked = false;
@@ -752,6 +788,7 @@ bool engine_poll(void)
             step_port_halt();
             playing = false;
             tail_valid = false;
+            single = false;
             expire_gap();
             if (next_taken) {
                 next_taken = false;
@@ -777,24 +814,8 @@ bool engine_poll(void)
             worked = true;
         } while (ring_free() > SEGMENT_COUNT / 2);
     }
-    if (!playing && pulses_due > 1) {
-        /* Single pulses, one at a time: a ring of one pulse. */
-        uint8_t top_bit = 15;
-        while (!(pulses_due >> top_bit))
-            top_bit--;
-        bool ccw = (pulses_due >> (top_bit - 1)) & 1;
-        pulses_due &= (uint16_t)((1u << (top_bit - 1)) - 1);
-        pulses_due |= (uint16_t)(1u << (top_bit - 1));
-        begin_ring();
-        command.flags = ccw ? MOTION_CCW : 0;
-        step_port_dir(dir_level(ccw));
-        profile.accel_pulses = profile.cruise_pulses = profile.decel_pulses = 0;
-        push(1, (uint16_t)(DIR_SETUP_TICKS + pulse_width_ticks() - 1), true, MOTION_STANDBY);
-        push(1, SHORTEST_PIECE_TICKS - 1, false, MOTION_STANDBY);
-        stage = STAGE_REST;
-        play();
-        worked = true;
-    }
+    if (pulses_due > 1)
+        worked |= play_single_pulses();
     return worked;
 }
 
