@@ -22,9 +22,9 @@ int main(void)
     for (;;) {
         /* Cleared before the polls: what an interrupt leaves to do meanwhile is seen in this round or the next. */
         wake_flag = 0;
-        bool worked = engine_poll();
-        worked |= terminal_poll();
+        bool worked = terminal_poll(); /* first: a line's end is what wakes a unit at rest, and its motion is awaited */
         worked |= queue_poll();
+        worked |= engine_poll();
         if (!worked) {
             wake_sleep();
         }

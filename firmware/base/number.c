@@ -21,51 +21,28 @@ bool number_add_digit(uint32_t *value, uint8_t digit)
 }
 
 static const uint32_t powers_of_ten[] FLASH = {
-    1000000000u, 100000000u, 10000000u, 1000000u, 100000u, 10000u, 1000u, 100u, 10u,
+    1000000000u, 100000000u, 10000000u, 1000000u, 100000u, 10000u, 1000u, 100u, 10u, 1u,
 };
 enum { POWERS = sizeof powers_of_ten / sizeof powers_of_ten[0] };
 
-/* All digits from the first that is not zero, or from the one that stands for 10^(least_digits - 1). */
-static char *format_digits(char *text, uint32_t value, uint8_t least_digits)
+char *number_format(char *text, uint32_t value, uint8_t decimals)
 {
     bool started = false;
-    for (uint8_t i = 0; i < POWERS; i++) {
-        const uint32_t power = flash_u32(&powers_of_ten[i]);
+    for (uint8_t place = POWERS; place > 0; place--) {
+        const uint32_t power = flash_u32(&powers_of_ten[POWERS - place]);
         char digit = '0';
         while (value >= power) {
             value -= power;
             digit++;
         }
-        started = started || digit != '0' || POWERS - i < least_digits;
+        started = started || digit != '0' || place <= decimals + 1;
         if (started) {
+            if (place == decimals) {
+                *text++ = '.';
+            }
             *text++ = digit;
         }
     }
-    *text++ = (char)('0' + value);
     *text = '\0';
     return text;
-}
-
-char *number_format_u32(char *text, uint32_t value)
-{
-    return format_digits(text, value, 1);
-}
-
-char *number_format_i32(char *text, int32_t value)
-{
-    if (value < 0) {
-        *text++ = '-';
-        return format_digits(text, 0u - (uint32_t)value, 1);
-    }
-    return format_digits(text, (uint32_t)value, 1);
-}
-
-char *number_format_centi(char *text, uint16_t hundredths)
-{
-    char *end = format_digits(text, hundredths, 3);
-    end[1] = '\0';
-    end[0] = end[-1];
-    end[-1] = end[-2];
-    end[-2] = '.';
-    return end + 1;
 }

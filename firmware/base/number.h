@@ -1,7 +1,7 @@
 /* Numbers to text and back, without division, printf or floating point.
  *
  * Reading is done a digit at a time, so that a line can be parsed while it arrives.
- * Context: main loop; pure. Cost: number_add_digit() about 35 cycles; number_format_u32() up to 1,500.
+ * Context: main loop; pure. Cost: number_add_digit() about 35 cycles; number_format() up to 1,500.
  * Errors:  an overflow is reported, never wrapped.
  * Tests:   test/host/test_number.c */
 #ifndef BASE_NUMBER_H
@@ -10,15 +10,14 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Room for the longest number, sign and terminating NUL: "-2147483648". */
+/* Room for the longest number, its point and the terminating NUL: "42949672.95". */
 #define NUMBER_TEXT_BYTES 12
 
 /* value = value * 10 + digit; false, and value unchanged, if the result does not fit 32 bits. digit: 0..9. */
 bool number_add_digit(uint32_t *value, uint8_t digit);
 
-/* Each returns the end of the text (its NUL). */
-char *number_format_u32(char *text, uint32_t value);
-char *number_format_i32(char *text, int32_t value);
-char *number_format_centi(char *text, uint16_t hundredths); /* 1047 -> "10.47", always two decimals */
+/* value / 10^decimals, all its decimals and at least one digit before them: 1047, 2 -> "10.47". decimals: 0..8. Returns
+ * the end of the text (its NUL). */
+char *number_format(char *text, uint32_t value, uint8_t decimals);
 
 #endif

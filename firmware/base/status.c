@@ -1,20 +1,20 @@
 #include "base/status.h"
 #include "base/flash.h"
 
-static const char words_OK[] FLASH = "";
-#define STATUS(name, number, words, remedy) static const char words_##name[] FLASH = words;
+/* One after the other, in the order of their numbers: those of status.def run from 1 without a gap. */
+static const char words[] FLASH = "\0"
+#define STATUS(name, number, words, remedy) words "\0"
 #include "base/status.def"
 #undef STATUS
-
-/* Indexed by number: the numbers of status.def run from 1 without a gap. */
-static const char *const words_by_number[] FLASH = {
-    [STATUS_OK] = words_OK,
-#define STATUS(name, number, words, remedy) [number] = words_##name,
-#include "base/status.def"
-#undef STATUS
-};
+    ;
 
 const char *status_words(status_t status)
 {
-    return flash_pointer(&words_by_number[status]);
+    const char *text = words;
+    for (uint8_t left = status; left > 0; text++) {
+        if (flash_u8(text) == '\0') {
+            left--;
+        }
+    }
+    return text;
 }

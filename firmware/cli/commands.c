@@ -8,19 +8,19 @@
 #include "queue/queue.h"
 #include "queue/session.h"
 
-typedef enum { CASE_ANY, CASE_EXACT } case_rule_t;
-typedef enum { ARGUMENT_NONE, ARGUMENT_REST } argument_t;
-
 typedef status_t (*handler_t)(const char *rest);
 
+/* A letter in the table, with what else the row says in its highest bit: no such character is typed (ASCII). */
+#define CASE_ANY 0x00u
+#define CASE_EXACT 0x80u /* in first */
+#define ARGUMENT_NONE 0x00u
+#define ARGUMENT_REST 0x80u /* in second */
+#define LETTER 0x7Fu
+
 typedef struct {
-    char first;
-    char second; /* 0: one letter is enough */
-    uint8_t case_rule;
-    uint8_t argument;
+    uint8_t first;
+    uint8_t second; /* letter 0: one is enough */
     handler_t handler;
-    const char *form;
-    const char *help;
 } command_row_t;
 
 static bool debugging;
@@ -192,57 +192,56 @@ static status_t command_later(const char *rest)
 
 /* -- the table -------------------------------------------------------------------------------------------------------- */
 
-#define COMMAND(name, first, second, case_rule, argument, handler, form, help) \
-    static const char form_##name[] FLASH = form;                              \
-    static const char help_##name[] FLASH = help;
-#include "cli/commands.def"
-#undef COMMAND
-
 static const command_row_t rows[] FLASH = {
-#define COMMAND(name, first, second, case_rule, argument, handler, form, help) \
-    {first, second, CASE_##case_rule, ARGUMENT_##argument, handler, form_##name, help_##name},
+#define COMMAND(name, first, second, case_rule, argument, handler, help) \
+    {(first) | CASE_##case_rule, (second) | ARGUMENT_##argument, handler},
 #include "cli/commands.def"
 #undef COMMAND
 };
 enum { ROWS = sizeof rows / sizeof rows[0] };
 
-static char lower(char c)
+const char commands_help[] FLASH =
+#define HELP(form, words) form "\t" words "\r\n"
+#define UNLISTED ""
+#define COMMAND(name, first, second, case_rule, argument, handler, help) help
+#include "cli/commands.def"
+#undef COMMAND
+    ;
+
+static uint8_t lower(uint8_t c)
 {
-    return c >= 'A' && c <= 'Z' ? (char)(c | 0x20) : c;
+    return c >= 'A' && c <= 'Z' ? c | 0x20u : c;
 }
 
 static status_t dispatch(const char *line)
 {
-    const char first = line[0];
-    const char first_lower = lower(first);
-    bool letter_known = false;
-
+    const uint8_t exact = (uint8_t)line[0] | CASE_EXACT;
+    const uint8_t any = lower((uint8_t)line[0]);
+    status_t status = STATUS_UNKNOWN_COMMAND;
+    if ((uint8_t)line[0] > LETTER) {
+        return status;
+    }
     for (const command_row_t *row = rows; row < rows + ROWS; row++) {
-        const char row_first = (char)flash_u8(&row->first);
-        if (row_first != first && row_first != first_lower) {
+        const uint8_t first = flash_u8(&row->first);
+        if (first != any && first != exact) {
             continue; /* most rows: nothing more is read of them */
         }
-        const bool exact = flash_u8(&row->case_rule) == CASE_EXACT;
-        if (exact && row_first != first) {
-            continue;
-        }
         const char *rest = line + 1;
-        const char row_second = (char)flash_u8(&row->second);
-        if (row_second != '\0') {
-            if (row_second != (exact ? *rest : lower(*rest))) {
+        const uint8_t second = flash_u8(&row->second);
+        if ((second & LETTER) != 0) {
+            const uint8_t typed = (uint8_t)*rest++;
+            if ((second & LETTER) != (first == any ? lower(typed) : typed)) {
                 continue;
             }
-            rest++;
         }
-        letter_known = true;
-        if (flash_u8(&row->argument) == ARGUMENT_NONE && !is_end(*rest)) {
-            continue;
+        status = STATUS_SYNTAX;
+        if (second >= ARGUMENT_REST || is_end(*rest)) {
+            handler_t handler;
+            FLASH_COPY(&handler, &row->handler, sizeof handler);
+            return handler(rest);
         }
-        handler_t handler;
-        FLASH_COPY(&handler, &row->handler, sizeof handler);
-        return handler(rest);
     }
-    return letter_known ? STATUS_SYNTAX : STATUS_UNKNOWN_COMMAND;
+    return status;
 }
 
 void commands_init(void)
@@ -255,7 +254,7 @@ void commands_init(void)
 /* The commands that are read by the rules of motion_syntax.h. */
 static bool is_read_ahead(char first)
 {
-    const char letter = lower(first);
+    const uint8_t letter = lower((uint8_t)first);
     return letter == 'm' || letter == 'v' || letter == 'a' || letter == 'd';
 }
 
@@ -307,28 +306,11 @@ const char *commands_refused_range(void)
 
 bool commands_at_once(char character)
 {
-    if (character == '+') {
-        command_pulse_cw("");
-    } else if (character == '-') {
-        command_pulse_ccw("");
-    } else {
-        return false;
+    const bool pulse = character == '+' || character == '-';
+    if (pulse) {
+        engine_single_pulse(character == '-');
     }
-    return true;
-}
-
-bool commands_next_help(uint8_t *row, const char **form, const char **help)
-{
-    for (uint8_t i = (uint8_t)(*row + 1); i < ROWS; i++) {
-        const char *text = flash_pointer(&rows[i].help);
-        if (flash_u8(text) != '\0') {
-            *row = i;
-            *form = flash_pointer(&rows[i].form);
-            *help = text;
-            return true;
-        }
-    }
-    return false;
+    return pulse;
 }
 
 bool commands_debugging(void)

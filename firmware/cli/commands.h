@@ -27,9 +27,8 @@ const char *commands_refused_range(void);
 /* + and -: whether this character, first on a line, is a command of its own. Executes it if so. */
 bool commands_at_once(char character);
 
-/* The row of commands.def after *row that has a help line: false at the end. Start with *row = COMMANDS_BEFORE_FIRST. */
-#define COMMANDS_BEFORE_FIRST 0xFFu
-bool commands_next_help(uint8_t *row, const char **form, const char **help);
+/* What `?` prints, in flash: form, tab, words of each command. */
+extern const char commands_help[];
 
 bool commands_debugging(void);
 

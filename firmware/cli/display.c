@@ -11,241 +11,235 @@ enum { PIECE_BYTES = 24 }; /* no piece is longer */
 
 static uint8_t waiting[DISPLAY_WAITING]; /* display_t, the first one is next */
 static uint8_t waiting_count;
-static bool printing;
 static uint8_t current; /* display_t */
 
-/* Where the current display stands; each display counts its own way. */
-static uint8_t row;
-static uint8_t column;
+static const char *text; /* in flash: what is still to come of the present text; 0: nothing is printed */
+static uint8_t ruled;    /* how many signs of a rule have been printed */
+static uint8_t row;      /* of the queue; then what follows its rows */
 
-/* A long text in flash on its way out, 0 for none. */
-static const char *streamed;
-
-/* What `cf` shows: as it was when the display began. */
+/* What `cf` shows: as it was when the display began, and whether GAP testing was on. */
 static session_t shown_session;
-static bool shown_gap;
+#define SHOWN_GAP (1u << 5)
+_Static_assert((SHOWN_GAP & SESSION_FLAGS) == 0, "a flag of its own");
 
-/* -- the queue: template of annex E, tab stops of 8 ------------------------------------------------------------------- */
+/* -- the texts -------------------------------------------------------------------------------------------------------- */
 
-static const char queue_header[] FLASH = "Q\tSteps\t\tRPM\tCycle\t Acc\tDec\tusteps\t deltaT\r\n"
-                                         "======================================================================\r\n";
-static const char queue_footer[] FLASH = "======================================================================\r\n"
-                                         "Q is at ";
-static const char queue_legend[] FLASH = "\t+ pulse\t\t\t* linear\t\ts sync\r\n";
-static const char queue_cw[] FLASH = "CW\t";
-static const char queue_ccw[] FLASH = "CCW\t";
-static const char queue_executing[] FLASH = "executing ";
-
-/* Values of row. */
+/* Characters of a text that stand for a value: print_field() knows them by the names below, in the same order. The
+ * first ones are of a row of the queue, or of a command with the session's defaults. */
+#define COUNT "\x80"
+#define RPM "\x81"
+#define CYCLE "\x82"
+#define ACCEL "\x83"
+#define DECEL "\x84"
+#define EXTRA "\x85"
+#define WAIT "\x86"
+#define ROW "\x87"
+#define NEXT "\x88"
+#define EXECUTING "\x89"
+#define VELOCITY "\x8A"
+#define POSITION "\x8B"
+#define STATE "\x8C"
+#define FAULTS "\x8D"
 enum {
-    QUEUE_HEADER,
-    QUEUE_ENTRIES, /* and on: position 0, shown in debug mode only, to 30 */
-    QUEUE_FOOTER = QUEUE_ENTRIES + QUEUE_LAST + 1,
-    QUEUE_LEGEND,
-    QUEUE_EXECUTING,
-    QUEUE_END,
+    FIELD_COUNT = 0x80,
+    FIELD_RPM,
+    FIELD_CYCLE,
+    FIELD_ACCEL,
+    FIELD_DECEL,
+    FIELD_EXTRA,
+    FIELD_WAIT,
+    FIELD_ROW,
+    FIELD_NEXT,
+    FIELD_EXECUTING,
+    FIELD_VELOCITY,
+    FIELD_POSITION,
+    FIELD_STATE,
+    FIELD_FAULTS,
 };
 
-/* One cell; false after the last one of the row. */
-static bool queue_cell(uint8_t position)
-{
-    const motion_command_t *entry = queue_entry(position);
-    switch (column++) {
-    case 0:
-        text_put_u32(position);
-        terminal_port_put('\t');
-        text_put_u32(entry->count);
-        terminal_port_put('\t');
-        return true;
-    case 1:
-        terminal_port_put(entry->flags & MOTION_PULSES ? '+' : ' ');
-        text_put_flash(entry->flags & MOTION_CCW ? queue_ccw : queue_cw);
-        text_put_u32(command_rpm(entry));
-        terminal_port_put('\t');
-        return true;
-    case 2:
-        text_put_u32(command_cycle_us(entry));
-        terminal_port_put('\t');
-        return true;
-    case 3:
-        terminal_port_put(entry->flags & MOTION_LINEAR ? '*' : ' ');
-        text_put_accel(entry->accel);
-        terminal_port_put('\t');
-        return true;
-    case 4:
-        text_put_accel(entry->decel);
-        terminal_port_put('\t');
-        return true;
-    case 5:
-        text_put_u32(entry->extra_pulses);
-        terminal_port_put('\t');
-        terminal_port_put(entry->flags & MOTION_SYNC ? 's' : ' ');
-        terminal_port_put(' ');
-        return true;
-    default:
-        text_put_u32(entry->start_wait_us);
-        text_new_line();
-        return false;
-    }
-}
+/* A choice between two texts: the first one if the command has the flag that is in these bits of the character. */
+#define CHOICE(flag, set, clear) flag set "\xA0" clear "\xA1"
+#define CCW "\xC1"
+#define PULSES "\xC2"
+#define LINEAR "\xC4"
+#define SYNC "\xC8"
+#define GAP "\xE0"
+enum { CHOICE_ELSE = 0xA0, CHOICE_END = 0xA1, CHOICE_BEGIN = 0xC0 };
+_Static_assert(MOTION_CCW == 0x01 && MOTION_PULSES == 0x02 && MOTION_LINEAR == 0x04 && MOTION_SYNC == 0x08 &&
+                   SHOWN_GAP == 0x20,
+               "the flags stand in the characters");
 
-static bool queue_piece(void)
-{
-    if (row >= QUEUE_ENTRIES && row < QUEUE_FOOTER) {
-        if (!queue_cell((uint8_t)(row - QUEUE_ENTRIES))) {
-            column = 0;
-            row++;
-        }
-        return true;
-    }
-    switch (row++) {
-    case QUEUE_HEADER:
-        streamed = queue_header;
-        if (!commands_debugging()) {
-            row++;
-        }
-        return true;
-    case QUEUE_FOOTER: streamed = queue_footer; return true;
-    case QUEUE_LEGEND:
-        text_put_u32(queue_next_position());
-        streamed = queue_legend;
-        return true;
-    case QUEUE_EXECUTING:
-        if (commands_debugging()) {
-            text_put_flash(queue_executing);
-            text_put_u32(queue_executing_position());
-            text_new_line();
-        }
-        return false;
-    default: return false;
-    }
-}
+/* A rule of 70 signs of equality. */
+#define RULE "=\r\n"
+enum { RULE_CHARACTERS = 70 };
 
-/* -- the session defaults and flags ----------------------------------------------------------------------------------- */
+/* The queue: template of annex E, tab stops of 8. */
+static const char queue_text[] FLASH = "Q\tSteps\t\tRPM\tCycle\t Acc\tDec\tusteps\t deltaT\r\n" RULE;
+/* clang-format off */
+static const char queue_row_text[] FLASH =
+    ROW "\t" COUNT "\t" CHOICE(PULSES, "+", " ") CHOICE(CCW, "CCW", "CW") "\t" RPM "\t" CYCLE
+    "\t" CHOICE(LINEAR, "*", " ") ACCEL "\t" DECEL "\t" EXTRA "\t" CHOICE(SYNC, "s", " ") " " WAIT "\r\n";
+/* clang-format on */
+static const char queue_end_text[] FLASH = RULE "Q is at " NEXT "\t+ pulse\t\t\t* linear\t\ts sync\r\n";
+static const char queue_executing_text[] FLASH = "executing " EXECUTING "\r\n";
 
-static const char defaults_velocity[] FLASH = "v ";
-static const char defaults_cycle[] FLASH = " cycle ";
-static const char defaults_accel[] FLASH = "\r\na ";
-static const char defaults_decel[] FLASH = " d ";
-static const char defaults_harmonic[] FLASH = " harmonic\r\nGAP ";
-static const char defaults_linear[] FLASH = " linear\r\nGAP ";
-static const char defaults_full_step[] FLASH = ", full step, ";
-static const char defaults_pulses[] FLASH = ", pulses, ";
-static const char text_on[] FLASH = "on";
-static const char text_off[] FLASH = "off";
-/* What these stand for is not built yet; they read as they will at its factory values. */
-static const char defaults_fixed[] FLASH = "EnF\r\nops 36, soft_ops off, CRC 1, ACK on\r\n";
+/* What EnF and the last line stand for is not built yet; they read as they will at its factory values. */
+/* clang-format off */
+static const char defaults_text[] FLASH =
+    "v " RPM " cycle " CYCLE "\r\n"
+    "a " ACCEL " d " DECEL " " CHOICE(LINEAR, "linear", "harmonic") "\r\n"
+    "GAP " CHOICE(GAP, "on", "off") ", " CHOICE(PULSES, "pulses", "full step") ", EnF\r\n"
+    "ops 36, soft_ops off, CRC 1, ACK on\r\n";
+/* clang-format on */
 
-static bool defaults_piece(void)
-{
-    motion_command_t command;
-    session_template(&shown_session, &command);
-    switch (row++) {
-    case 0:
-        text_put_flash(defaults_velocity);
-        text_put_u32(command_rpm(&command));
-        return true;
-    case 1:
-        text_put_flash(defaults_cycle);
-        text_put_u32(command_cycle_us(&command));
-        return true;
-    case 2:
-        text_put_flash(defaults_accel);
-        text_put_accel(command.accel);
-        text_put_flash(defaults_decel);
-        text_put_accel(command.decel);
-        return true;
-    case 3:
-        text_put_flash(command.flags & MOTION_LINEAR ? defaults_linear : defaults_harmonic);
-        text_put_flash(shown_gap ? text_on : text_off);
-        return true;
-    case 4:
-        text_put_flash(command.flags & MOTION_PULSES ? defaults_pulses : defaults_full_step);
-        streamed = defaults_fixed;
-        return true;
-    default: return false;
-    }
-}
+static const char velocity_text[] FLASH = VELOCITY "\r\n";
+static const char position_text[] FLASH = "position " POSITION " " STATE " faults " FAULTS "\r\n";
 
-/* -- velocity and position -------------------------------------------------------------------------------------------- */
-
-static bool velocity_piece(void)
-{
-    uint32_t rpm, cycle_us;
-    engine_velocity(&rpm, &cycle_us);
-    text_put_u32(rpm);
-    terminal_port_put(' ');
-    text_put_u32(cycle_us);
-    text_new_line();
-    return false;
-}
-
-static const char position_text[] FLASH = "position ";
-static const char faults_text[] FLASH = " faults ";
+/* What each display begins with. */
+static const char *const texts[] FLASH = {
+    [DISPLAY_QUEUE] = queue_text,       [DISPLAY_DEFAULTS] = defaults_text, [DISPLAY_VELOCITY] = velocity_text,
+    [DISPLAY_POSITION] = position_text, [DISPLAY_HELP] = commands_help,
+};
 
 /* Indexed by motion_state_t. */
 static const char state_words[][8] FLASH = {"STANDBY", "ACCEL", "CRUISE", "DECEL", "STOP"};
 
-static bool position_piece(void)
+/* -- printing --------------------------------------------------------------------------------------------------------- */
+
+/* The command whose values are shown. */
+static void shown_command(motion_command_t *command)
 {
-    switch (row++) {
-    case 0:
-        text_put_flash(position_text);
-        text_put_i32(engine_position());
+    if (current == DISPLAY_QUEUE && row < QUEUE_POSITIONS) {
+        *command = *queue_entry(row);
+    } else {
+        session_template(&shown_session, command);
+    }
+}
+
+static void put_accel(accel_code_t code)
+{
+    if (code < ACCEL_CODE_WHOLE) {
+        text_put_decimal(code, 2);
+    } else {
+        text_put_u32(code - (ACCEL_CODE_WHOLE - 100u));
+    }
+}
+
+/* At most 21 characters. */
+static void print_field(uint8_t field, const motion_command_t *command)
+{
+    uint32_t number, second;
+    switch (field) {
+    case FIELD_COUNT: number = command->count; break;
+    case FIELD_RPM: number = command_rpm(command); break;
+    case FIELD_CYCLE: number = command_cycle_us(command); break;
+    case FIELD_ACCEL: put_accel(command->accel); return;
+    case FIELD_DECEL: put_accel(command->decel); return;
+    case FIELD_EXTRA: number = command->extra_pulses; break;
+    case FIELD_WAIT: number = command->start_wait_us; break;
+    case FIELD_ROW: number = row; break;
+    case FIELD_NEXT: number = queue_next_position(); break;
+    case FIELD_EXECUTING: number = queue_executing_position(); break;
+    case FIELD_VELOCITY:
+        engine_velocity(&number, &second); /* both of the same moment */
+        text_put_u32(number);
         terminal_port_put(' ');
-        return true;
-    default:
-        text_put_flash(state_words[engine_state()]);
-        text_put_flash(faults_text);
-        text_put_u32(engine_faults());
-        text_new_line();
-        return false;
-    }
-}
-
-/* -- the list of commands --------------------------------------------------------------------------------------------- */
-
-static bool help_piece(void)
-{
-    const char *form, *help;
-    if (column == 0) {
-        uint8_t next = row;
-        if (!commands_next_help(&next, &form, &help)) {
-            return false;
+        number = second;
+        break;
+    case FIELD_POSITION:
+        number = (uint32_t)engine_position();
+        if (number & 0x80000000u) {
+            terminal_port_put('-');
+            number = 0u - number;
         }
-        text_put_flash(form);
-        terminal_port_put('\t');
-        column = 1;
-        return true;
+        break;
+    case FIELD_STATE: text_put_flash(state_words[engine_state()]); return;
+    default: number = engine_faults(); break;
     }
-    if (column == 1) {
-        commands_next_help(&row, &form, &help);
-        streamed = help;
-        column = 2;
-        return true;
-    }
-    text_new_line();
-    column = 0;
-    return true;
+    text_put_u32(number);
 }
-
-/* -- all of them ------------------------------------------------------------------------------------------------------ */
 
 static void begin(uint8_t display)
 {
     current = display;
-    printing = true;
-    row = display == DISPLAY_HELP ? COMMANDS_BEFORE_FIRST : 0;
-    column = 0;
+    text = flash_pointer(&texts[display]);
+    row = commands_debugging() ? UINT8_MAX : 0; /* position 0 is shown in debug mode only */
     shown_session = session;
-    shown_gap = engine_gap();
+    if (engine_gap()) {
+        shown_session.flags |= SHOWN_GAP;
+    }
 }
+
+/* The text is through: what follows it. */
+static void next_text(void)
+{
+    text = 0;
+    if (current == DISPLAY_QUEUE) {
+        row++;
+        if (row <= QUEUE_LAST) {
+            text = queue_row_text;
+        } else if (row == QUEUE_LAST + 1) {
+            text = queue_end_text;
+        } else if (row == QUEUE_LAST + 2 && commands_debugging()) {
+            text = queue_executing_text;
+        }
+    }
+    if (text == 0 && waiting_count > 0) {
+        begin(waiting[0]);
+        waiting_count--;
+        for (uint8_t i = 0; i < waiting_count; i++) {
+            waiting[i] = waiting[i + 1];
+        }
+    }
+}
+
+static void skip_behind(uint8_t mark)
+{
+    while (flash_u8(text++) != mark) {
+    }
+}
+
+/* Some characters, or a field. */
+static void print_piece(void)
+{
+    motion_command_t command;
+    shown_command(&command);
+    for (uint8_t room = PIECE_BYTES; room > 0; room--) {
+        const uint8_t character = flash_u8(text);
+        if (character == '\0') {
+            next_text();
+            return;
+        }
+        if (character >= FIELD_COUNT && character < CHOICE_ELSE) {
+            if (room == PIECE_BYTES) {
+                text++;
+                print_field(character, &command);
+            }
+            return;
+        }
+        if (character != '=' || ++ruled == RULE_CHARACTERS) {
+            ruled = 0;
+            text++;
+        }
+        if (character == CHOICE_ELSE) {
+            skip_behind(CHOICE_END);
+        } else if (character >= CHOICE_BEGIN) {
+            if (!(command.flags & character & ~CHOICE_BEGIN)) {
+                skip_behind(CHOICE_ELSE);
+            }
+        } else if (character != CHOICE_END) {
+            terminal_port_put(character);
+        }
+    }
+}
+
+/* -- from outside ----------------------------------------------------------------------------------------------------- */
 
 void display_init(void)
 {
     waiting_count = 0;
-    printing = false;
-    streamed = 0;
+    ruled = 0;
+    text = 0;
 }
 
 status_t display_request(display_t display)
@@ -263,43 +257,7 @@ status_t display_request(display_t display)
 
 bool display_active(void)
 {
-    return printing || streamed != 0;
-}
-
-/* The next piece of the current display; false if it was the last. */
-static bool print_piece(void)
-{
-    switch ((display_t)current) {
-    case DISPLAY_QUEUE: return queue_piece();
-    case DISPLAY_DEFAULTS: return defaults_piece();
-    case DISPLAY_VELOCITY: return velocity_piece();
-    case DISPLAY_POSITION: return position_piece();
-    case DISPLAY_HELP: return help_piece();
-    }
-    return false;
-}
-
-/* A piece of the streamed text. */
-static void print_streamed(void)
-{
-    for (uint8_t i = 0; i < PIECE_BYTES; i++) {
-        const uint8_t character = flash_u8(streamed);
-        if (character == '\0') {
-            streamed = 0;
-            return;
-        }
-        terminal_port_put(character);
-        streamed++;
-    }
-}
-
-static void next_waiting(void)
-{
-    begin(waiting[0]);
-    waiting_count--;
-    for (uint8_t i = 0; i < waiting_count; i++) {
-        waiting[i] = waiting[i + 1];
-    }
+    return text != 0;
 }
 
 bool display_poll(void)
@@ -307,13 +265,6 @@ bool display_poll(void)
     if (!display_active() || terminal_port_free() < PIECE_BYTES) {
         return false;
     }
-    if (streamed != 0) {
-        print_streamed();
-    } else {
-        printing = print_piece();
-    }
-    if (!display_active() && waiting_count > 0) {
-        next_waiting();
-    }
+    print_piece();
     return true;
 }

@@ -3,14 +3,6 @@
 #include "base/number.h"
 #include "cli/terminal_port.h"
 
-/* In RAM. */
-static void put(const char *text)
-{
-    while (*text != '\0') {
-        terminal_port_put((uint8_t)*text++);
-    }
-}
-
 void text_put_flash(const char *text)
 {
     for (uint8_t c; (c = flash_u8(text)) != '\0'; text++) {
@@ -18,29 +10,18 @@ void text_put_flash(const char *text)
     }
 }
 
+void text_put_decimal(uint32_t value, uint8_t decimals)
+{
+    char text[NUMBER_TEXT_BYTES];
+    number_format(text, value, decimals);
+    for (const char *c = text; *c != '\0'; c++) {
+        terminal_port_put((uint8_t)*c);
+    }
+}
+
 void text_put_u32(uint32_t value)
 {
-    char text[NUMBER_TEXT_BYTES];
-    number_format_u32(text, value);
-    put(text);
-}
-
-void text_put_i32(int32_t value)
-{
-    char text[NUMBER_TEXT_BYTES];
-    number_format_i32(text, value);
-    put(text);
-}
-
-void text_put_accel(accel_code_t code)
-{
-    char text[NUMBER_TEXT_BYTES];
-    if (code < ACCEL_CODE_WHOLE) {
-        number_format_centi(text, code);
-    } else {
-        number_format_u32(text, code - ACCEL_CODE_WHOLE + 100u);
-    }
-    put(text);
+    text_put_decimal(value, 0);
 }
 
 void text_new_line(void)

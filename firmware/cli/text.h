@@ -5,12 +5,10 @@
 #define CLI_TEXT_H
 
 #include <stdint.h>
-#include "motion/command.h"
 
 void text_put_flash(const char *text); /* in flash */
 void text_put_u32(uint32_t value);
-void text_put_i32(int32_t value);
-void text_put_accel(accel_code_t code); /* two decimals below 100, none from 100 */
-void text_new_line(void);               /* CR LF */
+void text_put_decimal(uint32_t value, uint8_t decimals); /* as number_format() */
+void text_new_line(void);                                /* CR LF */
 
 #endif
