@@ -2,6 +2,8 @@
  *
  * Every section with interrupts off is short: the step interrupt may be due every 32 cycles. Timer1's 16-bit registers
  * share one TEMP byte, so the main loop touches them only with interrupts off or the timer stopped. */
+#include "base/atomic.h"
+#include "base/inline.h"
 #include "motion/segment.h"
 #include "motion/step_port.h"
 #include <avr/interrupt.h>
@@ -15,16 +17,38 @@
 /* Ticks between reading TCNT1 and the timer standing still, and a margin. */
 #define FREEZE_TICKS 16
 
-static segment_t *segment_at(uint8_t offset)
+/* The ring is one page of RAM (motion/segment.h): an offset is the low byte of the address. */
+static inline segment_t *segment_at(uint8_t offset)
 {
-    return (segment_t *)((uint8_t *)segments + offset);
+    segment_t *segment;
+    __asm__("mov %A0, %1\n\tldi %B0, hi8(segments)" : "=b"(segment) : "r"(offset));
+    return segment;
 }
 
+/* Periods less one, from the bytes that are counted down: the low one 1..256 times, and so often 256 more. */
+static inline uint16_t less_one(uint8_t low, uint8_t high)
+{
+    return (uint16_t)((uint16_t)high << 8 | (uint8_t)(low - 1));
+}
+
+static inline void set_less_one(segment_t *segment, uint16_t periods_less_one)
+{
+    segment->count_low = (uint8_t)(periods_less_one + 1);
+    segment->count_high = (uint8_t)(periods_less_one >> 8);
+}
+
+static NOINLINE void set_compare(uint16_t top, uint16_t match)
+{
+    OCR1A = top;
+    OCR1B = match;
+}
+
+/* Mode 0, no clock: the compare registers are written directly (section 16.7.3). */
 void step_port_init(void)
 {
-    TCCR1A = 0;
-    TCCR1B = 0;
     TIMSK1 = 0;
+    TCCR1B = 0;
+    TCCR1A = 0;
 }
 
 void step_port_dir(bool level)
@@ -38,24 +62,19 @@ void step_port_dir(bool level)
 
 void step_port_start(void)
 {
-    TIMSK1 = 0;
-    TCCR1B = 0;
-    /* Mode 0 with the clock off: the compare registers are written directly (section 16.7.3). */
-    TCCR1A = 0;
-    OCR1A = STEP_PORT_LEAD_TICKS + LEAD_BEGIN - 1;
-    OCR1B = SEGMENT_SILENT;
+    step_port_init();
+    set_compare(STEP_PORT_LEAD_TICKS + LEAD_BEGIN - 1, SEGMENT_SILENT);
     TCNT1 = LEAD_BEGIN;
     TCCR1A = MODE15_A;
     TCCR1B = MODE15_B;
 
     uint8_t first = step_tail;
-    const segment_t *s = segment_at(first);
     segment_t *lead = segment_at((uint8_t)(first - SEGMENT_BYTES));
     lead->top = STEP_PORT_LEAD_TICKS - 1;
     lead->match = SEGMENT_SILENT;
     lead->flags = 0;
-    OCR1A = s->top;
-    OCR1B = s->match;
+    const segment_t *s = segment_at(first);
+    set_compare(s->top, s->match);
     GPIOR0 = s->count_low;
     GPIOR1 = s->count_high;
     step_flags = s->flags;
@@ -70,15 +89,14 @@ void step_port_start(void)
 step_snapshot_t step_port_snapshot(void)
 {
     step_snapshot_t at;
-    uint8_t sreg = SREG;
-    cli();
+    uint8_t state = atomic_begin();
     uint8_t low = GPIOR0;
     uint8_t high = GPIOR1;
     uint8_t flags = TIFR1;
     uint8_t pins = PINB;
     at.tail = step_tail;
-    SREG = sreg;
-    at.to_count = (uint16_t)((uint16_t)high << 8) + (uint16_t)(low ? low : 256u);
+    atomic_end(state);
+    at.to_count = (uint16_t)(less_one(low, high) + 1);
     at.pulse_high = (pins & 1 << 2) != 0;
     at.period_over = (flags & 1 << TOV1) != 0;
     return at;
@@ -129,8 +147,7 @@ bool step_port_arm(uint8_t offset, uint16_t top, uint16_t match, uint8_t flags)
     too_late = too_late > 64 ? (uint16_t)(too_late - 64) : 0;
     bool done = false;
 
-    uint8_t sreg = SREG;
-    cli();
+    uint8_t state = atomic_begin();
     uint8_t distance = (uint8_t)(after - step_tail);
     if (distance != 0 && distance <= (uint8_t)(step_head - step_tail)) {
         s->top = top;
@@ -146,7 +163,7 @@ bool step_port_arm(uint8_t offset, uint16_t top, uint16_t match, uint8_t flags)
         step_head = after;
         done = true;
     }
-    SREG = sreg;
+    atomic_end(state);
     if (done) {
         /* For the position; the interrupt reads a segment only once. */
         s->top = top;
@@ -160,43 +177,39 @@ bool step_port_extend(uint8_t offset)
 {
     segment_t *s = segment_at(offset);
     uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
+    uint16_t extended = (uint16_t)(less_one(s->count_low, s->count_high) + 1);
     bool done = false;
-    uint16_t counted = (uint16_t)((uint16_t)s->count_high << 8) + (uint16_t)(s->count_low ? s->count_low : 256u) + 1u;
-    uint8_t count_high = (uint8_t)((uint16_t)(counted - 1u) >> 8);
 
-    uint8_t sreg = SREG;
-    cli();
+    uint8_t state = atomic_begin();
     uint8_t distance = (uint8_t)(after - step_tail);
-    if (distance != 0 && distance <= (uint8_t)(step_head - step_tail)) {
-        s->count_low = (uint8_t)counted;
-        s->count_high = count_high;
-        step_head = after;
-        done = true;
-    } else if (distance == 0) {
+    if (distance == 0) {
         uint8_t low = GPIOR0;
         if (low >= 16 && low != 255) {
             GPIOR0 = (uint8_t)(low + 1);
-            step_head = after;
             done = true;
         }
+    } else if (distance <= (uint8_t)(step_head - step_tail)) {
+        set_less_one(s, extended); /* here already: the interrupt may be about to load it */
+        done = true;
     }
-    SREG = sreg;
-    if (done) {
-        s->count_low = (uint8_t)counted;
-        s->count_high = count_high;
-    }
+    if (done)
+        step_head = after;
+    atomic_end(state);
+    if (done)
+        set_less_one(s, extended);
     return done;
 }
 
 bool step_port_drop_after(uint8_t offset)
 {
     uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
-    uint8_t sreg = SREG;
-    cli();
-    bool done = (uint8_t)(after - step_tail) <= (uint8_t)(step_head - step_tail);
-    if (done)
+    bool done = false;
+    uint8_t state = atomic_begin();
+    if ((uint8_t)(after - step_tail) <= (uint8_t)(step_head - step_tail)) {
         step_head = after;
-    SREG = sreg;
+        done = true;
+    }
+    atomic_end(state);
     return done;
 }
 
@@ -204,46 +217,36 @@ uint16_t step_port_shorten(uint8_t offset, uint16_t periods)
 {
     segment_t *s = segment_at(offset);
     uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
-    uint8_t new_low = (uint8_t)periods;
-    uint8_t new_high = (uint8_t)((uint16_t)(periods - 1) >> 8);
-    uint16_t dropped = 0;
+    uint16_t planned = less_one(s->count_low, s->count_high);
+    uint16_t wanted = (uint16_t)(periods - 1);
+    uint16_t left = planned;
 
-    uint8_t sreg = SREG;
-    cli();
+    uint8_t state = atomic_begin();
     uint8_t tail = step_tail;
     step_head = after;
-    if (tail == after) {
-        uint8_t low = GPIOR0;
-        uint8_t high = GPIOR1;
-        if (high > new_high || (high == new_high && (uint8_t)(low - 1) > (uint8_t)(new_low - 1))) {
-            GPIOR0 = new_low;
-            GPIOR1 = new_high;
-            dropped = (uint16_t)(((uint16_t)high << 8) + (uint8_t)(low - 1));
-            dropped = (uint16_t)(dropped - (uint16_t)(((uint16_t)new_high << 8) + (uint8_t)(new_low - 1)));
-        }
-        SREG = sreg;
-        uint16_t counted = (uint16_t)((uint16_t)s->count_high << 8) + (uint16_t)(s->count_low ? s->count_low : 256u);
-        counted = (uint16_t)(counted - dropped);
-        s->count_low = (uint8_t)counted;
-        s->count_high = (uint8_t)((uint16_t)(counted - 1) >> 8);
+    if (tail != after) {
+        set_less_one(s, wanted); /* here already: the interrupt may be about to load it */
     } else {
-        dropped = (uint16_t)((uint16_t)(s->count_high << 8) + (s->count_low ? s->count_low : 256u));
-        dropped = (uint16_t)(dropped - periods);
-        s->count_low = new_low;
-        s->count_high = new_high;
-        SREG = sreg;
+        left = less_one(GPIOR0, GPIOR1);
+        if (left > wanted) {
+            GPIOR0 = (uint8_t)periods;
+            GPIOR1 = (uint8_t)(wanted >> 8);
+        } else {
+            left = wanted;
+        }
     }
-    return dropped;
+    atomic_end(state);
+    left = (uint16_t)(left - wanted);
+    set_less_one(s, (uint16_t)(planned - left));
+    return left;
 }
 
 uint8_t step_port_lock(void)
 {
-    uint8_t sreg = SREG;
-    cli();
-    return sreg;
+    return atomic_begin();
 }
 
 void step_port_unlock(uint8_t state)
 {
-    SREG = state;
+    atomic_end(state);
 }
