@@ -12,10 +12,12 @@
 #define SHORTEST_PIECE_TICKS 128u
 #define SILENCE_MAX_PERIODS 65000u
 #define AHEAD_TICKS 24576u       /* silence begun before a profile with ramps is planned: 1.5 ms */
+#define AHEAD_LONG_TICKS 49152u  /* twice that, where possible */
 #define AHEAD_SHORT_TICKS 6144u  /* and one without acceleration */
 #define AHEAD_PERIODS 12u        /* they last; when the last one begins, the next segment must be there */
 #define CUT_KEEP_TICKS 16384u    /* motion left to run while a deceleration is planned */
 #define CRUISE_GROUP_TICKS 1600u /* shortest run of a cruise whose interval has a fraction */
+#define JOIN_TICKS 12000u         /* before the tail: to plan a command and emit its first intervals */
 #define STARTED_WITH 3u          /* segments in the ring before the timer runs */
 #define RING_RESERVE 4u          /* segments that one step of emission may need */
 #define STEADY_MOST_GROUPS 12u /* emitted in the short way at a time (ramp.c) */
@@ -581,6 +583,7 @@ static void begin_ring(void)
 {
     if (playing)
         step_port_halt();
+    playing = false;
     step_head = step_tail = 0;
     step_hold = 0;
     step_held = 0;
@@ -626,8 +629,10 @@ static uint16_t certain_ticks(void)
     else /* c0 = sqrt(3.217e17 / (sprf * F * centi)) ticks; at least one step from 100 RPM on with 200 steps and more */
         certain = basis.steps_per_rev >= 200 && v_target >> basis.factor_log2 >= 10000u &&
                   command.accel == command.decel &&
-                  accel <= (400000000u >> basis.factor_log2) / basis.steps_per_rev;
-    return certain ? AHEAD_TICKS : 0;
+                  accel <= (130000000u >> basis.factor_log2) / basis.steps_per_rev;
+    if (!certain)
+        return 0;
+    return basis.slow_ticks > AHEAD_LONG_TICKS || command.flags & MOTION_LINEAR ? AHEAD_LONG_TICKS : AHEAD_TICKS;
 }
 
 /* Starts the command, which is not planned yet, from standstill. */
@@ -635,7 +640,7 @@ static void start_now(void)
 {
     begin_ring();
     step_port_dir(dir_level(is_ccw(&command)));
-    uint8_t flags = (uint8_t)(MOTION_ACCEL | direction_flags(&command, false));
+    uint8_t flags = direction_flags(&command, false);
     uint16_t certain = certain_ticks();
     if (command.start_wait_us < 4096u) {
         uint16_t lead = (uint16_t)(command.start_wait_us * TICKS_PER_US);
@@ -645,6 +650,7 @@ static void start_now(void)
         add_pulses(flags, 1);
         stage = STAGE_RUN;
         if (certain) {
+            flags = (uint8_t)(flags | (command.accel == ACCEL_NONE ? MOTION_CRUISE : MOTION_ACCEL));
             append(AHEAD_PERIODS, (uint16_t)(certain / AHEAD_PERIODS - 1), 0, flags);
             segment_at(SEGMENT_BYTES)->match = SEGMENT_SILENT;
             ahead_ticks = certain;
@@ -679,18 +685,62 @@ static uint32_t wait_ticks(uint32_t us)
     return us < UINT32_MAX / TICKS_PER_US ? us * TICKS_PER_US : UINT32_MAX;
 }
 
-/* Lets the command in `next` follow the one that has been emitted. */
+/* Does the tail begin late enough for the next command to be planned and its first intervals to be emitted before? */
+static bool time_to_join(void)
+{
+    step_snapshot_t at = step_port_snapshot();
+    uint8_t offset = (uint8_t)(at.tail - SEGMENT_BYTES);
+    uint16_t periods = at.to_count;
+    uint32_t ticks = 0;
+    if (!tail_valid || !tail_awaited)
+        return false;
+    while (offset != tail_offset) {
+        const segment_t *s = segment_at(offset);
+        ticks += period_ticks(s) * periods;
+        if (ticks >= JOIN_TICKS)
+            return true;
+        offset = (uint8_t)(offset + SEGMENT_BYTES);
+        periods = counted_periods(segment_at(offset));
+    }
+    return false;
+}
+
+/* Lets the command in `next` follow the one that has been emitted: exactly one interval after its last pulse where there
+ * is time for that, otherwise as soon as possible after its end. */
 static void join_next(void)
 {
-    uint32_t wait = wait_ticks(next.start_wait_us);
+    bool timely = time_to_join();
+    look_for_end();
+    if (!timely && tail_awaited)
+        return; /* at its end */
     bool turns = is_ccw(&next) != is_ccw(&command);
-    uint8_t flags = (uint8_t)(MOTION_STOP | direction_flags(&next, turns));
-    bool joined = false;
-    bool waited = false;
-    if (tail_valid && wait < SHORTEST_PIECE_TICKS) {
+    uint32_t wait = wait_ticks(next.start_wait_us);
+    command = next;
+    next_taken = false;
+    silence_chunks = 0;
+    piece_ticks = 0;
+    ramp_state = MOTION_STANDBY;
+    if (!timely) {
+        if (step_idle)
+            expire_gap();
+        start_now();
+        return;
+    }
+    /* Longer than the gap the wait means a start from slow speed. */
+    if (wait >= SHORTEST_PIECE_TICKS && closing.chunks < 0x10000u &&
+        wait > (closing.chunks << PROFILE_CHUNK_LOG2) + (closing.ticks_q8 >> 8))
+        expire_gap();
+    plan();
+    bool joined;
+    if (wait >= SHORTEST_PIECE_TICKS) {
+        joined = step_port_drop_after(tail_offset);
+        dir_due = turns;
+        stage = STAGE_LEAD;
+    } else {
+        uint8_t flags = (uint8_t)(MOTION_STOP | direction_flags(&command, turns));
         if (tail_fast && !turns && wait == 0) {
             joined = step_port_extend(last_run_offset);
-            if (joined && tail_awaited) {
+            if (joined) {
                 tail_awaited = false; /* no tail is played */
                 ended++;
             }
@@ -700,32 +750,11 @@ static void join_next(void)
         }
         if (joined)
             add_pulses(flags, 1);
-    } else if (tail_valid) {
-        /* The wait counts from the end of the command before; longer than the gap it means a start from slow speed. */
-        uint32_t gap_ticks = closing.chunks < 0x10000u
-                                 ? (closing.chunks << PROFILE_CHUNK_LOG2) + (closing.ticks_q8 >> 8)
-                                 : UINT32_MAX;
-        if (gap_on && wait > gap_ticks && v_in_play != basis.v_slow) {
-            expire_gap();
-        }
-        joined = waited = step_port_drop_after(tail_offset);
+        stage = STAGE_RUN;
     }
-    silence_chunks = 0;
-    piece_ticks = 0;
-    next_taken = false;
+    if (!joined)
+        start_now(); /* cannot be, unless an interrupt took a millisecond */
     tail_valid = false;
-    command = next;
-    ramp_state = MOTION_STANDBY;
-    if (!joined) {
-        /* Too late to be joined: it starts by itself, at the velocity in play if the gap has not passed. */
-        if (step_idle)
-            expire_gap();
-        start_now();
-        return;
-    }
-    plan();
-    dir_due = waited && turns;
-    stage = waited ? STAGE_LEAD : STAGE_RUN;
 }
 
 status_t engine_check(const motion_command_t *c)
@@ -784,7 +813,7 @@ bool engine_poll(void)
         faults |= ENGINE_FAULT_LATE;
     }
     if (playing && step_idle) {
-        if (stage == STAGE_REST) {
+        if (stage == STAGE_REST && step_head == step_tail) {
             step_port_halt();
             playing = false;
             tail_valid = false;
@@ -802,10 +831,8 @@ bool engine_poll(void)
         }
         worked = true;
     }
-    if (next_taken && (stage == STAGE_GAP || stage == STAGE_END || stage == STAGE_REST) && playing) {
+    if (next_taken && playing && (stage == STAGE_GAP || stage == STAGE_END || stage == STAGE_REST))
         join_next();
-        worked = true;
-    }
     /* Until the ring is half full nothing else is as urgent; then a step at a time. */
     if (playing) {
         do {
