@@ -57,10 +57,11 @@ FIRMWARE_SRCS := \
     firmware/hal/usart_isr.S
 
 # -- the tests -------------------------------------------------------------------------------------------------------
-# Host tests: test/host/<name>.c, one binary a module, with the sources that <name>_SRCS lists.
+# Host tests: test/host/<name>.c, one binary a module, with the sources that <name>_SRCS lists; <name>_HOST_SRCS are
+# needed on the host alone, and assembler on the AVR alone.
 
 HOST_TESTS := test_number test_status test_baud test_line test_session test_queue test_motion_syntax test_commands \
-    test_display test_terminal
+    test_display test_terminal test_wide test_ramp test_profile test_engine test_property_planner
 FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 CLI_SRCS := firmware/cli/commands.c firmware/cli/display.c firmware/cli/text.c firmware/cli/motion_syntax.c \
     firmware/base/number.c firmware/queue/queue.c firmware/queue/session.c firmware/settings.c $(FAKE_SRCS)
@@ -74,9 +75,18 @@ test_motion_syntax_SRCS := firmware/cli/motion_syntax.c firmware/base/number.c f
 test_commands_SRCS := $(CLI_SRCS)
 test_display_SRCS := $(CLI_SRCS)
 test_terminal_SRCS := $(CLI_SRCS) firmware/cli/terminal.c firmware/cli/line.c firmware/base/status.c
+test_wide_SRCS := firmware/base/wide.S
+RAMP_SRCS := firmware/motion/ramp.c $(wildcard firmware/motion/ramp*.S) firmware/base/wide.S
+test_ramp_SRCS := $(RAMP_SRCS)
+test_ramp_HOST_SRCS := test/host/motion_exact.c
+test_profile_SRCS := firmware/motion/profile.c $(RAMP_SRCS)
+ENGINE_SRCS := firmware/motion/engine.c firmware/motion/profile.c firmware/motion/ramp.c firmware/settings.c \
+    test/host/fakes/step_player.c
+test_engine_SRCS := $(ENGINE_SRCS)
+test_property_planner_SRCS := $(ENGINE_SRCS) test/host/motion_exact.c
 
 # Arithmetic that is tested on the AVR as well: the same source, compiled by avr-gcc, run on the simulated board.
-AVR_TESTS := test_number test_line test_session
+AVR_TESTS := test_number test_line test_session test_wide test_ramp test_profile
 
 # Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
 IMAGE_TESTS := test_image_motion test_image_queue test_image_terminal test_image_stop
@@ -217,7 +227,7 @@ $(BUILD)/unity-sanitized.o: $(UNITY)/unity.c
 	$(Q)$(HOST_CC) -O1 -g $(UNITY_FLAGS) $(SANITIZE) -c -o $@ $<
 
 .SECONDEXPANSION:
-$(HOST_BINS): $(BUILD)/host/%: test/host/%.c $$($$*_SRCS) $(BUILD)/unity-sanitized.o $(HOST_HEADERS) Makefile
+$(HOST_BINS): $(BUILD)/host/%: test/host/%.c $$($$*_SRCS) $$($$*_HOST_SRCS) $(BUILD)/unity-sanitized.o $(HOST_HEADERS) Makefile
 	@mkdir -p $(@D)
 	$(call say,CC  $@)
 	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O1 $(UNITY_FLAGS) $(SANITIZE) $(TEST_INCLUDES) -o $@ $(filter %.c %.o,$^) -lm
@@ -229,7 +239,7 @@ $(AVR_IMAGES): $(BUILD)/avr/%.elf: test/host/%.c $$($$*_SRCS) test/avr/report.c 
 	$(call say,CC  $@)
 	$(Q)$(AVR)gcc $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 -Os -g -fshort-enums -ffunction-sections -fdata-sections \
 	    -Wl,--gc-sections -UAVR -include test/avr/report.h -DUNITY_EXCLUDE_FLOAT $(TEST_INCLUDES) -o $@ \
-	    $(filter %.c,$^) $(UNITY)/unity.c
+	    $(filter %.c %.S,$^) $(UNITY)/unity.c -lm
 
 $(BUILD)/avr/run: test/avr/run.c $(BOARD_LIB) $(HOST_HEADERS)
 	@mkdir -p $(@D)

@@ -747,7 +747,7 @@ static void test_next_ends_the_command_and_goes_on_with_the_queued_one(void)
         run_to_end();
         /* What had been handed to the timer may still be made; then exactly 100 backwards. */
         int64_t first = (int64_t)step_player_edges() - 100;
-        TEST_ASSERT_TRUE(first >= (int64_t)edges && first <= (int64_t)edges + 8);
+        if(!(first >= (int64_t)edges && first <= (int64_t)edges + 8)) {char t[99]; snprintf(t,99,"at %llu edges %llu first %lld",(unsigned long long)at,(unsigned long long)edges,(long long)first); TEST_FAIL_MESSAGE(t);}
         assert_ended_at((int32_t)(first - 100));
         TEST_ASSERT_EQUAL_UINT8(2, ended());
     }
@@ -845,6 +845,22 @@ static void test_single_pulses_are_ignored_while_a_command_runs(void)
     assert_ended_at(200);
 }
 
+/* PUL-002, PUL-005 */
+static void test_single_pulses_are_made_in_the_gap_after_a_command(void)
+{
+    for (unsigned polls = 0; polls < 8; polls++) {
+        setUp();
+        submit(move(50, 100, 1, 999));
+        run_to_state(MOTION_STOP);
+        run_to_state(MOTION_STANDBY);
+        run_for(7000 * polls);
+        engine_single_pulse(true);
+        engine_single_pulse(true);
+        run_to_end();
+        assert_ended_at(48);
+    }
+}
+
 static void test_a_command_after_single_pulses_is_exact(void)
 {
     for (unsigned polls = 0; polls < 12; polls++) {
@@ -858,7 +874,7 @@ static void test_a_command_after_single_pulses_is_exact(void)
         submit(move(-50, 100, 1, 1));
         run_to_end();
         uint64_t singles = step_player_edges() - 50;
-        TEST_ASSERT_TRUE(singles <= 2);
+        TEST_ASSERT_LESS_OR_EQUAL_UINT64(2, singles);
         assert_ended_at((int32_t)singles - 50);
     }
 }
@@ -1056,6 +1072,7 @@ int main(void)
     RUN_TEST(test_single_pulses_are_stacked_in_both_directions);
     RUN_TEST(test_a_single_pulse_is_one_edge_whatever_the_microsteps);
     RUN_TEST(test_single_pulses_are_ignored_while_a_command_runs);
+    RUN_TEST(test_single_pulses_are_made_in_the_gap_after_a_command);
     RUN_TEST(test_a_command_after_single_pulses_is_exact);
     RUN_TEST(test_the_position_equals_the_edges_at_every_moment);
     RUN_TEST(test_the_position_counts_a_pulse_whose_interrupt_is_held_off);
