@@ -15,9 +15,10 @@
 #define AHEAD_LONG_TICKS 49152u  /* twice that, where possible */
 #define AHEAD_SHORT_TICKS 6144u  /* and one without acceleration */
 #define AHEAD_PERIODS 12u        /* they last; when the last one begins, the next segment must be there */
-#define CUT_KEEP_TICKS 16384u    /* motion left to run while a deceleration is planned */
+#define CUT_KEEP_TICKS 32768u    /* motion left to run while a deceleration is planned */
 #define CRUISE_GROUP_TICKS 1600u /* shortest run of a cruise whose interval has a fraction */
 #define JOIN_TICKS 12000u         /* before the tail: to plan a command and emit its first intervals */
+#define JOIN_SOON_TICKS 160000u   /* before the tail: when that is done at the earliest */
 #define STARTED_WITH 3u          /* segments in the ring before the timer runs */
 #define RING_RESERVE 4u          /* segments that one step of emission may need */
 #define STEADY_MOST_GROUPS 12u /* emitted in the short way at a time (ramp.c) */
@@ -54,6 +55,8 @@ static profile_interval_t closing; /* of the last command emitted */
 static uint8_t tail_offset;      /* its tail segment, while stage is REST, GAP or END */
 static bool tail_valid;          /* a command can still be joined to it */
 static bool tail_awaited;        /* it has not begun yet: its command has not ended */
+static bool joined;              /* the ring holds the end of one command and the beginning of the next one ... */
+static uint8_t joined_offset;    /* ... which begins at the end of this segment */
 static bool tail_fast;           /* too fast for a tail: a following command lengthens the last run instead */
 static uint8_t last_run_offset;
 
@@ -64,7 +67,6 @@ static bool gap_on = true;
 static uint32_t v_in_play;
 static uint32_t in_play_cycle_us; /* 0: follows from v_in_play */
 static bool single;               /* the ring plays single pulses */
-static uint16_t pulses_due;       /* single pulses waiting: bits below the highest one set, 1 = CCW, oldest on top */
 
 static uint16_t pulse_width_ticks(void)
 {
@@ -97,7 +99,6 @@ void engine_init(void)
 {
     profile_basis(&basis, settings.steps_per_rev, settings.ustep, settings.slow_rpm);
     v_in_play = basis.v_slow;
-    pulses_due = 1;
     step_port_init();
 }
 
@@ -166,11 +167,17 @@ static void add_pulses(uint8_t flags, uint16_t pulses)
         emitted += pulses;
 }
 
+static bool has_begun(uint8_t offset)
+{
+    return (uint8_t)(step_head - offset) > (uint8_t)(step_head - step_tail);
+}
+
 /* The command whose closing interval has begun its tail has ended. */
 static void look_for_end(void)
 {
-    uint8_t from_tail = (uint8_t)(step_head - tail_offset);
-    if (tail_awaited && from_tail > (uint8_t)(step_head - step_tail)) {
+    if (joined && has_begun(joined_offset))
+        joined = false;
+    if (tail_awaited && has_begun(tail_offset)) {
         tail_awaited = false;
         ended++;
     }
@@ -594,6 +601,7 @@ static void begin_ring(void)
     piece_ticks = 0;
     dir_due = false;
     tail_valid = false;
+    joined = false;
     single = false;
     ramp_state = MOTION_STANDBY;
 }
@@ -685,34 +693,34 @@ static uint32_t wait_ticks(uint32_t us)
     return us < UINT32_MAX / TICKS_PER_US ? us * TICKS_PER_US : UINT32_MAX;
 }
 
-/* Does the tail begin late enough for the next command to be planned and its first intervals to be emitted before? */
-static bool time_to_join(void)
+/* Ticks until the tail begins, or more than JOIN_SOON_TICKS; 0: it has begun. */
+static uint32_t ticks_to_tail(void)
 {
     step_snapshot_t at = step_port_snapshot();
     uint8_t offset = (uint8_t)(at.tail - SEGMENT_BYTES);
     uint16_t periods = at.to_count;
     uint32_t ticks = 0;
+    look_for_end();
     if (!tail_valid || !tail_awaited)
-        return false;
-    while (offset != tail_offset) {
+        return 0;
+    while (offset != tail_offset && ticks <= JOIN_SOON_TICKS) {
         const segment_t *s = segment_at(offset);
         ticks += period_ticks(s) * periods;
-        if (ticks >= JOIN_TICKS)
-            return true;
         offset = (uint8_t)(offset + SEGMENT_BYTES);
         periods = counted_periods(segment_at(offset));
     }
-    return false;
+    return ticks;
 }
 
 /* Lets the command in `next` follow the one that has been emitted: exactly one interval after its last pulse where there
- * is time for that, otherwise as soon as possible after its end. */
+ * is time to plan it and to emit its first intervals, otherwise as soon as possible after its end. Not long before, so
+ * that the running command can still be cut without the next one. */
 static void join_next(void)
 {
-    bool timely = time_to_join();
-    look_for_end();
-    if (!timely && tail_awaited)
-        return; /* at its end */
+    uint32_t ticks = ticks_to_tail();
+    bool timely = ticks >= JOIN_TICKS;
+    if (ticks > JOIN_SOON_TICKS || (!timely && tail_awaited))
+        return; /* later; at its end */
     bool turns = is_ccw(&next) != is_ccw(&command);
     uint32_t wait = wait_ticks(next.start_wait_us);
     command = next;
@@ -731,7 +739,7 @@ static void join_next(void)
         wait > (closing.chunks << PROFILE_CHUNK_LOG2) + (closing.ticks_q8 >> 8))
         expire_gap();
     plan();
-    bool joined;
+    joined_offset = tail_offset;
     if (wait >= SHORTEST_PIECE_TICKS) {
         joined = step_port_drop_after(tail_offset);
         dir_due = turns;
@@ -739,11 +747,8 @@ static void join_next(void)
     } else {
         uint8_t flags = (uint8_t)(MOTION_STOP | direction_flags(&command, turns));
         if (tail_fast && !turns && wait == 0) {
+            joined_offset = last_run_offset;
             joined = step_port_extend(last_run_offset);
-            if (joined) {
-                tail_awaited = false; /* no tail is played */
-                ended++;
-            }
         } else {
             uint16_t top = (uint16_t)(segment_at(tail_offset)->top + wait);
             joined = step_port_arm(tail_offset, top, (uint16_t)(top - pulse_width_ticks()), flags);
@@ -752,8 +757,12 @@ static void join_next(void)
             add_pulses(flags, 1);
         stage = STAGE_RUN;
     }
-    if (!joined)
+    if (joined) {
+        tail_awaited = false;
+        ended++;
+    } else {
         start_now(); /* cannot be, unless an interrupt took a millisecond */
+    }
     tail_valid = false;
 }
 
@@ -776,32 +785,6 @@ void engine_submit(const motion_command_t *submitted)
         next = *submitted;
         next_taken = true;
     }
-}
-
-/* Single pulses need no plan: each is a segment, and the silence behind the last one is taken back for the next. */
-static bool play_single_pulses(void)
-{
-    if (!single)
-        begin_ring();
-    else if (playing && !step_port_drop_after(tail_offset))
-        return false; /* just over: they start anew when it is idle */
-    stage = STAGE_REST;
-    single = true;
-    while (pulses_due > 1 && ring_free() >= RING_RESERVE) {
-        uint16_t newest = pulses_due;
-        uint8_t older = 0;
-        while (newest >> (older + 1) > 1)
-            older++;
-        command.flags = (newest >> older) & 1 ? MOTION_CCW : 0;
-        pulses_due = (uint16_t)((newest & ((1u << older) - 1)) | 1u << older);
-        dir_due = true;
-        tail_offset = step_head;
-        push(1, (uint16_t)(SHORTEST_PIECE_TICKS + pulse_width_ticks() - 1), true, MOTION_STANDBY);
-    }
-    push(1, SHORTEST_PIECE_TICKS - 1, false, MOTION_STANDBY);
-    if (!playing)
-        play();
-    return true;
 }
 
 bool engine_poll(void)
@@ -841,8 +824,6 @@ bool engine_poll(void)
             worked = true;
         } while (ring_free() > SEGMENT_COUNT / 2);
     }
-    if (pulses_due > 1)
-        worked |= play_single_pulses();
     return worked;
 }
 
@@ -862,15 +843,15 @@ static bool running(void)
 
 static void drop_next(void)
 {
-    if (next_taken)
-        ended++;
+    look_for_end();
+    ended = (uint8_t)(ended + next_taken + joined);
     next_taken = false;
+    joined = false;
 }
 
 /* Freezes the pulse train where it is. */
 static void halt(void)
 {
-    pulses_due = 1;
     if (!playing)
         return;
     step_port_halt();
@@ -913,7 +894,7 @@ static uint32_t cut(void)
             break;
         }
         const segment_t *s = segment_at(offset);
-        if ((s->flags & SEGMENT_STATE_MASK) == MOTION_STOP)
+        if ((s->flags & SEGMENT_STATE_MASK) == MOTION_STOP && is_silent(s))
             return 0;
         uint16_t period = (uint16_t)(s->top + 1u);
         if (!is_silent(s)) {
@@ -984,25 +965,45 @@ static void end_command(accel_code_t decel, bool linear)
 void engine_stop_graceful(accel_code_t decel, bool linear)
 {
     drop_next();
-    pulses_due = 1;
     end_command(decel, linear);
 }
 
 void engine_next(void)
 {
-    end_command(ACCEL_NONE, false);
+    look_for_end();
+    if (!joined) /* else it ends within JOIN_SOON_TICKS */
+        end_command(ACCEL_NONE, false);
 }
 
 void engine_next_graceful(void)
 {
-    end_command(command.decel, (command.flags & MOTION_LINEAR) != 0);
+    look_for_end();
+    if (!joined)
+        end_command(command.decel, (command.flags & MOTION_LINEAR) != 0);
 }
 
+/* Needs no plan: each pulse is a segment, and the silence behind the last one is taken back for the next. */
 void engine_single_pulse(bool ccw)
 {
-    if (running() || next_taken || pulses_due >> 14)
+    if (running() || next_taken)
         return;
-    pulses_due = (uint16_t)(pulses_due << 1 | ccw);
+    while (single && playing && ring_free() < RING_RESERVE)
+        ; /* 10 us a pulse */
+    if (single && playing && !step_port_drop_after(tail_offset)) {
+        while (!step_idle)
+            ; /* the silence behind the last one has begun: 8 us */
+    }
+    if (!single || step_idle)
+        begin_ring();
+    stage = STAGE_REST;
+    single = true;
+    command.flags = ccw ? MOTION_CCW : 0;
+    dir_due = true;
+    tail_offset = step_head;
+    push(1, (uint16_t)(SHORTEST_PIECE_TICKS + pulse_width_ticks() - 1), true, MOTION_STANDBY);
+    push(1, SHORTEST_PIECE_TICKS - 1, false, MOTION_STANDBY);
+    if (!playing)
+        play();
 }
 
 /* -- what others see ------------------------------------------------------------------------------------------------ */
