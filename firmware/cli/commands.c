@@ -198,7 +198,12 @@ static const command_row_t rows[] FLASH = {
 #include "cli/commands.def"
 #undef COMMAND
 };
-enum { ROWS = sizeof rows / sizeof rows[0] };
+enum {
+#define COMMAND(name, first, second, case_rule, argument, handler, help) ROW_##name,
+#include "cli/commands.def"
+#undef COMMAND
+    ROWS
+};
 
 const char commands_help[] FLASH =
 #define HELP(form, words) form "\t" words "\r\n"
@@ -221,7 +226,13 @@ static status_t dispatch(const char *line)
     if ((uint8_t)line[0] > LETTER) {
         return status;
     }
-    for (const command_row_t *row = rows; row < rows + ROWS; row++) {
+    const command_row_t *row = rows;
+    const command_row_t *end = rows + ROW_RAMP;
+    if (any == '$') {
+        row = end;
+        end = rows + ROWS;
+    }
+    for (; row < end; row++) {
         const uint8_t first = flash_u8(&row->first);
         if (first != any && first != exact) {
             continue; /* most rows: nothing more is read of them */

@@ -7,8 +7,6 @@
 #include "queue/queue.h"
 #include "queue/session.h"
 
-enum { PIECE_BYTES = 24 }; /* no piece is longer */
-
 static uint8_t waiting[DISPLAY_WAITING]; /* display_t, the first one is next */
 static uint8_t waiting_count;
 static uint8_t current; /* display_t */
@@ -204,14 +202,14 @@ static void print_piece(void)
 {
     motion_command_t command;
     shown_command(&command);
-    for (uint8_t room = PIECE_BYTES; room > 0; room--) {
+    for (uint8_t room = TEXT_PIECE_BYTES; room > 0; room--) {
         const uint8_t character = flash_u8(text);
         if (character == '\0') {
             next_text();
             return;
         }
         if (character >= FIELD_COUNT && character < CHOICE_ELSE) {
-            if (room == PIECE_BYTES) {
+            if (room == TEXT_PIECE_BYTES) {
                 text++;
                 print_field(character, &command);
             }
@@ -262,7 +260,7 @@ bool display_active(void)
 
 bool display_poll(void)
 {
-    if (!display_active() || terminal_port_free() < PIECE_BYTES) {
+    if (!display_active() || terminal_port_free() < TEXT_PIECE_BYTES) {
         return false;
     }
     print_piece();

@@ -9,14 +9,11 @@
 #include "cli/timebase_port.h"
 #include "version.h"
 
-/* The longest answer: CR LF, an error with its range, CR LF, the prompt. */
-enum { ANSWER_BYTES = 36 };
-
-/* At a high rate several bytes are taken in one round of the main loop, but never more than one line. */
+/* At a high rate several bytes are taken in one round of the main loop, but not beyond the end of a line. */
 enum { BYTES_AT_ONCE = 8 };
 
-/* With more than these waiting to be taken, the output rests. */
-enum { PRESSED_BYTES = 16 };
+/* With more than these waiting to be taken, the output rests, and so many lines are executed in one round. */
+enum { PRESSED_BYTES = 16, PRESSED_LINES = 3 };
 
 static const char version_line[] FLASH = "SAC " VERSION_NUMBER " " VERSION_DATE "\r\n";
 static const char prompt[] FLASH = "SAC>";
@@ -31,67 +28,57 @@ static status_t owed_status;   /* the first error since, or STATUS_OK */
 static const char *owed_range; /* of that error */
 
 /* Debug mode: how long the last line took. */
-static bool owes_times;
+static uint8_t owes_times;   /* pieces of the report */
 static bool timing;          /* this line is being timed: not while the times of the last one are owed */
 static uint32_t received_us; /* while a line is typed: when it began */
 static uint32_t loaded_us;
 
-static const char received_text[] FLASH = "received ";
-static const char loaded_text[] FLASH = " us, loaded ";
-static const char times_end[] FLASH = " us\r\n";
-enum { TIMES_BYTES = 9 + 10 + 12 + 10 + 5 };
-
-static void put_error(status_t status)
+/* Each at most TEXT_PIECE_BYTES long. */
+static void put_error(void)
 {
     terminal_port_put('?');
-    text_put_u32(status);
+    text_put_u32(owed_status);
     terminal_port_put(' ');
-    text_put_flash(status_words(status));
-    if (status == STATUS_RANGE) {
+    text_put_flash(status_words(owed_status));
+    if (owed_status == STATUS_RANGE) {
         terminal_port_put(' ');
         text_put_flash(owed_range);
     }
     text_new_line();
 }
 
-static void put_times(void)
+static void put_time(const char *before, uint32_t us)
 {
-    text_put_flash(received_text);
-    text_put_u32(received_us);
-    text_put_flash(loaded_text);
-    text_put_u32(loaded_us);
-    text_put_flash(times_end);
+    text_put_flash(before);
+    text_put_u32(us);
+    text_put_flash(FLASH_TEXT(" us"));
 }
 
-/* Sends the next part of what is owed, if it fits: the end of the echoed line, displays, times, error and prompt. */
+/* Sends the next piece of what is owed, if it fits: the end of the echoed line, displays, times, error, prompt. */
 static NOINLINE bool pay(void)
 {
-    const uint8_t room = terminal_port_free();
-    if (display_active() && !owes_new_line) {
-        return display_poll();
-    }
-    if (room < (owes_times ? 2 + TIMES_BYTES : ANSWER_BYTES)) {
+    if (terminal_port_free() < TEXT_PIECE_BYTES) {
         return false;
     }
     if (owes_new_line) {
-        text_new_line();
         owes_new_line = false;
-    }
-    if (display_active()) {
-        return true;
-    }
-    if (owes_times) {
-        put_times();
-        owes_times = false;
-        return true;
-    }
-    if (owed_status != STATUS_OK) {
-        put_error(owed_status);
+        text_new_line();
+    } else if (display_poll()) {
+        /* a piece of it */
+    } else if (owes_times == 2) {
+        owes_times = 1;
+        put_time(FLASH_TEXT("received "), received_us);
+    } else if (owes_times == 1) {
+        owes_times = 0;
+        put_time(FLASH_TEXT(", loaded "), loaded_us);
+        text_new_line();
+    } else if (owed_status != STATUS_OK) {
+        put_error();
         owed_status = STATUS_OK;
-        return true;
+    } else {
+        text_put_flash(prompt);
+        behind = false;
     }
-    text_put_flash(prompt);
-    behind = false;
     return true;
 }
 
@@ -146,7 +133,7 @@ static NOINLINE void note_received(void)
 static NOINLINE void note_loaded(void)
 {
     loaded_us = timebase_us() - loaded_us;
-    owes_times = true;
+    owes_times = 2;
 }
 
 static NOINLINE void end_line(void)
@@ -158,12 +145,13 @@ static NOINLINE void end_line(void)
     status_t status = line.status;
     if (status == STATUS_OK) {
         status = commands_execute(line.text, line.length); /* the motion first, then the answer */
+    } else {
+        commands_read_ahead(line.text, 0);
     }
     if (timed && commands_debugging()) {
         note_loaded();
     }
     line_reset(&line);
-    commands_read_ahead(line.text, 0);
     owe(status);
 }
 
@@ -173,7 +161,7 @@ static NOINLINE bool begin_line(uint8_t byte)
     if (commands_at_once((char)byte)) {
         return false;
     }
-    timing = commands_debugging() && !owes_times;
+    timing = commands_debugging() && owes_times == 0;
     if (timing) {
         received_us = timebase_us();
     }
@@ -186,7 +174,7 @@ void terminal_init(void)
     echoed = 0;
     behind = false;
     owes_new_line = false;
-    owes_times = false;
+    owes_times = 0;
     timing = false;
     owed_status = STATUS_OK;
     display_init();
@@ -218,19 +206,26 @@ static line_event_t take(bool *worked)
 bool terminal_poll(void)
 {
     bool worked = false;
-    const line_event_t event = take(&worked);
-    if (event == LINE_ERASED) {
-        erase();
-    }
-    if (!behind) {
-        worked |= echo();
-    }
-    if (event == LINE_ENDED) {
+    for (uint8_t lines = PRESSED_LINES; lines > 0; lines--) {
+        const line_event_t event = take(&worked);
+        if (event == LINE_ERASED) {
+            erase();
+        }
+        if (!behind) {
+            worked |= echo();
+        }
+        if (event != LINE_ENDED) {
+            if (worked) {
+                commands_read_ahead(line.text, line.length);
+            }
+            if (event == LINE_CLEARED) {
+                owe(STATUS_OK);
+            }
+            break;
+        }
         end_line();
-    } else if (worked) {
-        commands_read_ahead(line.text, line.length);
-        if (event == LINE_CLEARED) {
-            owe(STATUS_OK);
+        if (terminal_port_waiting() <= PRESSED_BYTES) {
+            break;
         }
     }
     if (behind && terminal_port_waiting() <= PRESSED_BYTES) {

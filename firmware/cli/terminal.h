@@ -1,9 +1,9 @@
 /* The terminal: what is typed becomes lines and commands; echo, answers and the prompt go back.
  *
  * Input comes first. Every line is executed as soon as it is complete, whatever the output is doing. While a display is
- * printed, or when lines come faster than the port sends or the processor can answer, echo and answers are held back: afterwards one prompt
- * follows, with the first error since, and what is already typed of the next line. So a flood of lines at the port's
- * own rate is executed completely, and its echo is thinned out by whole lines.
+ * printed, or when lines come faster than the port sends or the processor can answer, echo and answers are held back:
+ * afterwards one prompt follows, with the first error since, and what is already typed of the next line. So a flood of
+ * lines at the port's own rate is executed completely, and its echo is thinned out by whole lines.
  * + and - as the first character of a line act at once; they are not echoed.
  * Context: main loop.
  * Errors:  answered as `?<number> <words>`.

@@ -6,6 +6,9 @@
 
 #include <stdint.h>
 
+/* What is put at a time is no longer than this: whoever has room for so many may go on. */
+#define TEXT_PIECE_BYTES 24
+
 void text_put_flash(const char *text); /* in flash */
 void text_put_u32(uint32_t value);
 void text_put_decimal(uint32_t value, uint8_t decimals); /* as number_format() */

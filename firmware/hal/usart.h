@@ -3,7 +3,7 @@
 #define HAL_USART_H
 
 #define USART_RX_BYTES 128
-#define USART_TX_BYTES 64
+#define USART_TX_BYTES 32
 
 /* Stands in the receive ring for what was lost: a byte with a framing error, or bytes before an overrun. It is not a
  * character of any command; in binary data a checksum tells it from a genuine 0xFF. */

@@ -18,9 +18,7 @@ void setUp(void)
     display_init();
 }
 
-void tearDown(void)
-{
-}
+void tearDown(void) {}
 
 static void execute(const char *text)
 {
@@ -179,9 +177,9 @@ static void test_p_shows_position_state_and_faults(void)
 static void test_the_list_has_one_line_for_each_available_command(void)
 {
     const char *text = shown("?");
-    static const char *const forms[] = {"m[-]n",  "vd",      "v[n] vc<n>", "a[n.nn]", "d[n.nn]", "+", "-",  "S", "s", "N",
-                                        "n",      "q",       "cf",         "p",       "g",       "b", "$L0 $L1",
-                                        "$F",     "$P",      "$U",         "?"};
+    static const char *const forms[] = {"m[-]n", "vd", "v[n] vc<n>", "a[n.nn]", "d[n.nn]", "+",  "-",
+                                        "S",     "s",  "N",          "n",       "q",       "cf", "p",
+                                        "g",     "b",  "?",          "$L0 $L1", "$F",      "$P", "$U"};
     unsigned lines = 0;
     for (const char *c = text; *c != '\0'; c++) {
         lines += *c == '\n';

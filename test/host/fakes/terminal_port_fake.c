@@ -3,7 +3,7 @@
 #include <string.h>
 #include "cli/terminal_port.h"
 
-enum { PLACES = 63 };
+enum { PLACES = 31 };
 
 static unsigned char typed[100000];
 static size_t typed_count, taken_count;

@@ -9,7 +9,7 @@ void terminal_port_fake_type(const char *text);        /* appends to what will b
 void terminal_port_fake_type_byte(unsigned char byte); /* likewise */
 size_t terminal_port_fake_untaken(void);               /* how much of it has not been taken */
 void terminal_port_fake_press(int press);              /* 1: what was typed counts as waiting in the ring */
-void terminal_port_fake_hold(int hold);                /* 1: what is sent fills the 63 places until it is drained */
+void terminal_port_fake_hold(int hold);                /* 1: what is sent fills the 31 places until it is drained */
 void terminal_port_fake_drain(size_t bytes);           /* the line has sent so many */
 const char *terminal_port_fake_text(void);             /* everything sent since the reset, NUL-terminated */
 unsigned terminal_port_fake_sent(void);
