@@ -8,6 +8,7 @@
 
 #define TICKS_PER_US 16u
 #define DIR_SETUP_TICKS 80u      /* dir before the first pulse: 5 us, the slowest common drivers ask for it */
+#define TURN_TICKS (DIR_SETUP_TICKS + 100u) /* the same where the step interrupt sets dir: its latency and cycles */
 #define TAIL_TICKS 320u          /* the end of the closing interval, on which a following command is joined */
 #define SHORTEST_PIECE_TICKS 128u
 #define SILENCE_MAX_PERIODS 65000u
@@ -48,7 +49,7 @@ static motion_state_t ramp_state; /* the phase that `ramp` was begun for; MOTION
 static uint32_t silence_chunks;  /* still to be emitted before ... */
 static uint16_t piece_ticks;     /* ... this period; 0: none */
 static bool piece_pulse;
-static int16_t carry_q8;         /* 1/256 ticks rounded off so far */
+static int32_t carry_q8;         /* 1/256 ticks rounded off so far */
 static uint16_t ahead_ticks;     /* part of the next interval that has been emitted as silence */
 static bool dir_due;             /* the next single period sets the dir pin */
 static profile_interval_t closing; /* of the last command emitted */
@@ -311,7 +312,7 @@ static void set_interval(uint32_t chunks, uint32_t ticks, bool pulse)
 /* Adds the carried fraction to a time; what remains is carried on. */
 static uint32_t take_carry(uint32_t ticks, uint16_t frac_q8)
 {
-    int16_t carry = (int16_t)(carry_q8 + (int16_t)frac_q8);
+    int32_t carry = carry_q8 + frac_q8;
     carry_q8 = carry & 0xFF;
     return (uint32_t)((int32_t)ticks + (carry >> 8));
 }
@@ -326,7 +327,7 @@ static void push_run(uint16_t pulses, uint16_t longer, uint16_t ticks, bool fast
         longer = 0;
     else if (pulses - longer <= early)
         longer = pulses;
-    carry_q8 = (int16_t)(carry_q8 + (int16_t)((uint16_t)(ideal - longer) << 8));
+    carry_q8 += (int32_t)(int16_t)(ideal - longer) * 256;
     if (faster && longer)
         push(longer, ticks, true, state);
     if (pulses != longer)
@@ -347,6 +348,11 @@ static inline void append(uint16_t periods, uint16_t top, uint16_t width, uint8_
     step_head = (uint8_t)(step_head + SEGMENT_BYTES);
 }
 
+static void append_silence(uint16_t periods, uint16_t top, uint8_t flags)
+{
+    append(periods, top, (uint16_t)(top - SEGMENT_SILENT), flags);
+}
+
 /* Several groups in the short way: the ramp hardly bends, each group fits the timer, and there are many pulses left. */
 static void emit_steady(uint32_t *left, uint32_t at_most, bool faster, motion_state_t state)
 {
@@ -361,7 +367,7 @@ static void emit_steady(uint32_t *left, uint32_t at_most, bool faster, motion_st
         step_hold = (uint8_t)(spare - 1);
         step_port_unlock(lock);
     }
-    uint32_t sum_q8 = (uint16_t)carry_q8;
+    uint32_t sum_q8 = (uint32_t)carry_q8;
     uint16_t made = 0;
     uint16_t most = at_most > 0x7FFFu ? 0x7FFFu : (uint16_t)at_most;
     most = (uint16_t)(most - 2 * pulses);
@@ -388,7 +394,7 @@ static void emit_steady(uint32_t *left, uint32_t at_most, bool faster, motion_st
         if (step_held)
             break;
     }
-    carry_q8 = (int16_t)sum_q8;
+    carry_q8 = (int32_t)sum_q8;
     *left -= made;
     add_pulses(flags, made);
 }
@@ -462,8 +468,8 @@ static void emit_cruise(uint32_t *left, uint32_t at_most)
             block = (uint16_t)(block * 2);
         if (run > block)
             run = block;
-        uint32_t fraction = (uint32_t)run * frac + (uint16_t)carry_q8;
-        carry_q8 = (int16_t)(fraction & 0xFF);
+        uint32_t fraction = (uint32_t)run * frac + (uint32_t)carry_q8;
+        carry_q8 = (uint8_t)fraction;
         *left -= run;
         push_run(run, (uint16_t)(fraction >> 8), (uint16_t)ticks, true, MOTION_CRUISE);
     }
@@ -659,8 +665,7 @@ static void start_now(void)
         stage = STAGE_RUN;
         if (certain) {
             flags = (uint8_t)(flags | (command.accel == ACCEL_NONE ? MOTION_CRUISE : MOTION_ACCEL));
-            append(AHEAD_PERIODS, (uint16_t)(certain / AHEAD_PERIODS - 1), 0, flags);
-            segment_at(SEGMENT_BYTES)->match = SEGMENT_SILENT;
+            append_silence(AHEAD_PERIODS, (uint16_t)(certain / AHEAD_PERIODS - 1), flags);
             ahead_ticks = certain;
             play();
         }
@@ -751,6 +756,8 @@ static void join_next(void)
             joined = step_port_extend(last_run_offset);
         } else {
             uint16_t top = (uint16_t)(segment_at(tail_offset)->top + wait);
+            if (turns && top < TURN_TICKS + pulse_width_ticks())
+                top = (uint16_t)(TURN_TICKS + pulse_width_ticks());
             joined = step_port_arm(tail_offset, top, (uint16_t)(top - pulse_width_ticks()), flags);
         }
         if (joined)
@@ -807,7 +814,7 @@ bool engine_poll(void)
                 command = next;
                 start_now();
             }
-        } else if (step_head != step_tail) {
+        } else if (step_head != step_tail && step_port_snapshot().period_over) {
             /* The planner was so late that the timer ran out of segments: go on where it stopped. */
             faults |= ENGINE_FAULT_STARVED;
             step_port_start();
@@ -985,7 +992,7 @@ void engine_next_graceful(void)
 /* Needs no plan: each pulse is a segment, and the silence behind the last one is taken back for the next. */
 void engine_single_pulse(bool ccw)
 {
-    if (running() || next_taken)
+    if (next_taken || (!(single && playing) && running()))
         return;
     while (single && playing && ring_free() < RING_RESERVE)
         ; /* 10 us a pulse */
@@ -998,10 +1005,12 @@ void engine_single_pulse(bool ccw)
     stage = STAGE_REST;
     single = true;
     command.flags = ccw ? MOTION_CCW : 0;
-    dir_due = true;
     tail_offset = step_head;
-    push(1, (uint16_t)(SHORTEST_PIECE_TICKS + pulse_width_ticks() - 1), true, MOTION_STANDBY);
-    push(1, SHORTEST_PIECE_TICKS - 1, false, MOTION_STANDBY);
+    uint8_t flags = direction_flags(&command, true);
+    uint16_t width = pulse_width_ticks();
+    append(1, (uint16_t)(TURN_TICKS + width - 1), width, flags);
+    append_silence(1, SHORTEST_PIECE_TICKS - 1, MOTION_STANDBY);
+    add_pulses(flags, 1);
     if (!playing)
         play();
 }
