@@ -939,6 +939,13 @@ static void test_the_velocity_is_that_of_the_interval_being_played(void)
     TEST_ASSERT_EQUAL_UINT32(10, rpm);
     TEST_ASSERT_EQUAL_UINT32(30000, cycle_us);
     setUp();
+    engine_set_gap(false); /* it stays in play, to the microsecond */
+    submit(cycle_move(400, 2871, 1, 999));
+    run_to_end();
+    engine_velocity(&rpm, &cycle_us);
+    TEST_ASSERT_EQUAL_UINT32(104, rpm);
+    TEST_ASSERT_EQUAL_UINT32(2871, cycle_us);
+    setUp();
     submit(move(200, 100, 1, 1));
     while (step_player_edges() < 41)
         run_for(500);

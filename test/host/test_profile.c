@@ -386,6 +386,10 @@ static void test_periods_below_2_us_or_the_pulse_and_1_us_are_refused(void)
     TEST_ASSERT_EQUAL(STATUS_OK, profile_check(&basis, &command, 1));
     command.velocity = 1172; /* 255.97 us */
     TEST_ASSERT_EQUAL(STATUS_PERIOD_TOO_SHORT, profile_check(&basis, &command, 1));
+    command.velocity = 75; /* 4000 us for 128 pulses of 30 us and 1 us */
+    TEST_ASSERT_EQUAL(STATUS_OK, profile_check(&basis, &command, 30));
+    command.velocity = 76;
+    TEST_ASSERT_EQUAL(STATUS_PERIOD_TOO_SHORT, profile_check(&basis, &command, 30));
     command.velocity = UINT32_MAX;
     TEST_ASSERT_EQUAL(STATUS_PERIOD_TOO_SHORT, profile_check(&basis, &command, 1));
     command.velocity = 0;

@@ -31,6 +31,7 @@ static struct {
     uint16_t late_top, late_match;
     uint32_t to_count; /* GPIOR1:GPIOR0 */
     uint8_t waiting;   /* periods still to be waited for before a reload */
+    uint64_t waits_from;
     bool dir;
     unsigned loads;
     player_harm_t harm;
@@ -171,18 +172,22 @@ static void ring_empty(void)
 static void interrupt(void)
 {
     if (p.waiting) {
-        if (--p.waiting == 0)
-            load(STEP_PLAYER_WAITED_TICKS);
+        if (--p.waiting == 0) {
+            uint64_t behind = p.waits_from > p.begin ? p.waits_from - p.begin : 0;
+            load((uint32_t)behind + STEP_PLAYER_WAITED_TICKS);
+        }
         return;
     }
     if (--p.to_count)
         return;
-    if (step_head == step_tail)
+    if (step_head == step_tail) {
         ring_empty();
-    else if (step_flags & EARLY)
+    } else if (step_flags & EARLY) {
         p.waiting = step_flags & EARLIER ? 2 : 1;
-    else
+        p.waits_from = p.begin + STEP_PLAYER_WAITS_AFTER;
+    } else {
         load(step_player_load_ticks);
+    }
 }
 
 /* -- the timer ------------------------------------------------------------------------------------------------------- */

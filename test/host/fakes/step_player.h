@@ -31,7 +31,8 @@ typedef struct {
 } player_change_t;
 
 #define STEP_PLAYER_LOAD_TICKS 80   /* interrupt latency 28 and 52 to the last register: the worst that is allowed */
-#define STEP_PLAYER_WAITED_TICKS 30 /* from the end of a period that was waited for to the last register */
+#define STEP_PLAYER_WAITED_TICKS 30 /* from the end of a period that was waited for to the last register ... */
+#define STEP_PLAYER_WAITS_AFTER 63  /* ... if the interrupt, latency 28 and 35 cycles, waits by then */
 
 void step_player_reset(void);
 extern uint32_t step_player_load_ticks; /* STEP_PLAYER_LOAD_TICKS after a reset */
