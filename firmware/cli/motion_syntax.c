@@ -5,14 +5,36 @@
 #include "motion/engine.h"
 #include "settings.h"
 
-typedef enum { NUMBER_NONE, NUMBER_WHOLE, NUMBER_FLOOR, NUMBER_RAMP, NUMBER_SIGNED } number_kind_t;
-
 typedef enum {
 #define PARAMETER(name, letter, number) PARAMETER_##name,
 #include "cli/motion_parameters.def"
 #undef PARAMETER
     PARAMETERS
 } parameter_t;
+
+/* motion_syntax_t.number: what the number being read consists of, and what it may */
+enum {
+    HAS_DIGIT = 1 << 0,
+    HAS_POINT = 1 << 1,
+    HAS_MINUS = 1 << 2,
+    HAS_ANY = HAS_DIGIT | HAS_POINT | HAS_MINUS,
+    NOT_ZERO = 1 << 3,  /* a digit other than 0, even beyond the decimals that count */
+    NO_MORE = 1 << 4,   /* further decimals do not count */
+    NO_NUMBER = 1 << 5, /* none may follow */
+    POINT = 1 << 6,     /* a point may follow */
+    DECIMALS = 1 << 7,  /* and decimals behind it count */
+};
+
+/* What a number begins with. */
+enum {
+    NUMBER_WHOLE = 0,
+    NUMBER_SIGNED = 0,
+    NUMBER_FLAG = 0,
+    NUMBER_BYTE = 0,
+    NUMBER_NONE = NO_NUMBER,
+    NUMBER_FLOOR = POINT,
+    NUMBER_RAMP = POINT | DECIMALS,
+};
 
 static const uint8_t parameter_number[PARAMETERS] FLASH = {
 #define PARAMETER(name, letter, number) NUMBER_##number,
@@ -27,175 +49,136 @@ static const uint8_t parameter_by_letter[26] FLASH = {
 #undef PARAMETER
 };
 
-/* motion_syntax_t.number */
-enum {
-    HAS_DIGIT = 1 << 0,
-    HAS_POINT = 1 << 1,
-    HAS_MINUS = 1 << 2,
-    NOT_ZERO = 1 << 3,  /* a digit other than 0, even beyond the decimals that count */
-    NO_MORE = 1 << 4,   /* further decimals do not count */
-    NO_NUMBER = 1 << 5, /* none may follow */
-};
-
 /* motion_syntax_t.given */
 enum {
     GIVEN_RAMP = 1 << 0,  /* l */
-    GIVEN_ACCEL = 1 << 1, /* a with a value */
+    GIVEN_ACCEL = 1 << 1, /* a */
     GIVEN_DECEL = 1 << 2,
-    DEFAULT_ACCEL = 1 << 3, /* a without one: the system default of the ramp that the command ends up with */
-    DEFAULT_DECEL = 1 << 4,
-    ENDED = 1 << 5, /* a space was met */
+    ENDED = 1 << 3, /* a space was met */
 };
 
 static const char range_flag[] FLASH = "0..1";
 static const char range_byte[] FLASH = "0..255";
 static const char range_ramp[] FLASH = "0.01..999";
 
+/* Nothing more is read after an error: the first one stands. */
 static void refuse(motion_syntax_t *syntax, status_t status)
 {
-    if (syntax->status == STATUS_OK) {
-        syntax->status = status;
-    }
+    syntax->status = status;
 }
 
-static void refuse_range(motion_syntax_t *syntax, const char *range)
+static NOINLINE void refuse_range(motion_syntax_t *syntax, const char *range)
 {
-    if (syntax->status == STATUS_OK) {
-        syntax->status = STATUS_RANGE;
-        syntax->range = range;
-    }
+    syntax->status = STATUS_RANGE;
+    syntax->range = range;
 }
 
 static void open_parameter(motion_syntax_t *syntax, uint8_t parameter)
 {
     syntax->parameter = parameter;
     syntax->value = 0;
-    syntax->number = flash_u8(&parameter_number[parameter]) == NUMBER_NONE ? NO_NUMBER : 0;
+    syntax->number = flash_u8(&parameter_number[parameter]);
     syntax->places = 0;
 }
 
-static void set_flag(motion_command_t *command, uint8_t flag, bool on)
+/* A ramp value: its code, or 0 for the system default, which resolve_ramp() puts in its place. */
+static NOINLINE void close_ramp(motion_syntax_t *syntax)
 {
-    command->flags = on ? command->flags | flag : command->flags & (uint8_t)~flag;
-}
-
-/* A flag parameter: 0 or 1, 1 without a number. */
-static void close_flag(motion_syntax_t *syntax, uint8_t flag)
-{
-    if (syntax->value > 1) {
-        refuse_range(syntax, range_flag);
-        return;
-    }
-    set_flag(&syntax->command, flag, syntax->value != 0 || !(syntax->number & HAS_DIGIT));
-}
-
-/* A ramp value: its code, or 0 for the system default. */
-static accel_code_t close_ramp(motion_syntax_t *syntax)
-{
-    uint32_t value = syntax->value;
-    if (syntax->places == 0 && value >= 100) {
+    const uint32_t value = syntax->value;
+    uint8_t places = syntax->places;
+    accel_code_t code = (accel_code_t)value; /* hundredths; below 10,000 if any place was taken */
+    if (places == 0 && value >= 100) {
         if (value > 999) {
             refuse_range(syntax, range_ramp);
-            return 0;
+            return;
         }
-        return (accel_code_t)(value - 100 + ACCEL_CODE_WHOLE);
+        code = (accel_code_t)(code + (ACCEL_CODE_WHOLE - 100));
+    } else {
+        for (; places < 2; places++) {
+            code = (accel_code_t)(code * 10u);
+        }
+        if (code == 0 && (syntax->number & NOT_ZERO)) {
+            refuse_range(syntax, range_ramp); /* not 0 itself, but below 0.01 */
+            return;
+        }
     }
-    uint16_t hundredths = (uint16_t)value; /* below 10,000 here */
-    for (uint8_t places = syntax->places; places < 2; places++) {
-        hundredths = (uint16_t)(hundredths * 10u);
+    if (syntax->parameter == PARAMETER_ACCEL) {
+        syntax->command.accel = code;
+        syntax->given |= GIVEN_ACCEL;
+    } else {
+        syntax->command.decel = code;
+        syntax->given |= GIVEN_DECEL;
     }
-    if (hundredths == 0 && (syntax->number & NOT_ZERO)) {
-        refuse_range(syntax, range_ramp); /* not 0 itself, but below 0.01 */
-    }
-    return hundredths;
-}
-
-/* The last of two equal parameters wins. */
-static void note_given(motion_syntax_t *syntax, uint8_t bit, uint8_t instead_of)
-{
-    syntax->given = (uint8_t)((syntax->given & ~instead_of) | bit);
-}
-
-static void close_accel(motion_syntax_t *syntax)
-{
-    const accel_code_t code = close_ramp(syntax);
-    syntax->command.accel = code;
-    note_given(syntax, code != 0 ? GIVEN_ACCEL : DEFAULT_ACCEL, GIVEN_ACCEL | DEFAULT_ACCEL);
-}
-
-static void close_decel(motion_syntax_t *syntax)
-{
-    const accel_code_t code = close_ramp(syntax);
-    syntax->command.decel = code;
-    note_given(syntax, code != 0 ? GIVEN_DECEL : DEFAULT_DECEL, GIVEN_DECEL | DEFAULT_DECEL);
-}
-
-static void close_count(motion_syntax_t *syntax)
-{
-    motion_command_t *command = &syntax->command;
-    const bool minus = syntax->number & HAS_MINUS;
-    const bool bare = !(syntax->number & (HAS_DIGIT | HAS_MINUS));
-    command->count = syntax->value;
-    set_flag(command, MOTION_CCW, bare ? settings.direction != 0 : minus);
-}
-
-static void close_velocity(motion_syntax_t *syntax)
-{
-    if (!(syntax->number & HAS_DIGIT)) {
-        syntax->command.velocity = settings.cycle_us;
-        set_flag(&syntax->command, MOTION_CYCLE, true);
-        return;
-    }
-    if (syntax->value == 0) {
-        refuse(syntax, STATUS_VELOCITY_ZERO);
-    }
-    syntax->command.velocity = syntax->value;
-    set_flag(&syntax->command, MOTION_CYCLE, false);
-}
-
-static void close_cycle(motion_syntax_t *syntax)
-{
-    if (!(syntax->number & HAS_DIGIT)) {
-        refuse(syntax, STATUS_NUMBER_MISSING);
-    } else if (syntax->value == 0) {
-        refuse(syntax, STATUS_PERIOD_TOO_SHORT);
-    }
-    syntax->command.velocity = syntax->value;
-    set_flag(&syntax->command, MOTION_CYCLE, true);
-}
-
-static void close_extra(motion_syntax_t *syntax)
-{
-    if (syntax->value > UINT8_MAX) {
-        refuse_range(syntax, range_byte);
-        return;
-    }
-    syntax->command.extra_pulses = (uint8_t)syntax->value;
 }
 
 /* The number being read is complete. */
-static void close_parameter(motion_syntax_t *syntax)
+static NOINLINE void close_parameter(motion_syntax_t *syntax)
 {
-    if ((syntax->number & HAS_POINT) && !(syntax->number & HAS_DIGIT)) {
+    motion_command_t *command = &syntax->command;
+    const uint8_t number = syntax->number;
+    uint32_t value = syntax->value;
+    uint8_t flag = 0; /* of the command, that this parameter sets */
+    bool on = false;  /* or clears */
+    if ((number & (HAS_POINT | HAS_DIGIT)) == HAS_POINT) {
         refuse(syntax, STATUS_NUMBER_MISSING);
         return;
     }
     switch ((parameter_t)syntax->parameter) {
-    case PARAMETER_COUNT: close_count(syntax); break;
-    case PARAMETER_VELOCITY: close_velocity(syntax); break;
-    case PARAMETER_CYCLE: close_cycle(syntax); break;
-    case PARAMETER_ACCEL: close_accel(syntax); break;
-    case PARAMETER_DECEL: close_decel(syntax); break;
+    case PARAMETER_COUNT:
+        command->count = value;
+        flag = MOTION_CCW;
+        on = number & (HAS_DIGIT | HAS_MINUS) ? (number & HAS_MINUS) != 0 : settings.direction != 0;
+        break;
+    case PARAMETER_VELOCITY:
+        if (!(number & HAS_DIGIT)) {
+            value = settings.cycle_us;
+            on = true;
+        } else if (value == 0) {
+            refuse(syntax, STATUS_VELOCITY_ZERO);
+        }
+        flag = MOTION_CYCLE;
+        command->velocity = value;
+        break;
+    case PARAMETER_CYCLE:
+        if (value == 0) {
+            refuse(syntax, number & HAS_DIGIT ? STATUS_PERIOD_TOO_SHORT : STATUS_NUMBER_MISSING);
+        }
+        flag = MOTION_CYCLE;
+        on = true;
+        command->velocity = value;
+        break;
+    case PARAMETER_ACCEL:
+    case PARAMETER_DECEL: close_ramp(syntax); return;
     case PARAMETER_LINEAR:
-        close_flag(syntax, MOTION_LINEAR);
+        flag = MOTION_LINEAR;
         syntax->given |= GIVEN_RAMP;
         break;
-    case PARAMETER_EXTRA: close_extra(syntax); break;
-    case PARAMETER_WAIT: syntax->command.start_wait_us = syntax->value; break;
-    case PARAMETER_SYNC: close_flag(syntax, MOTION_SYNC); break;
-    case PARAMETER_FULL_STEP: set_flag(&syntax->command, MOTION_PULSES, false); break;
-    case PARAMETER_PULSES: set_flag(&syntax->command, MOTION_PULSES, true); break;
+    case PARAMETER_EXTRA:
+        if (value > UINT8_MAX) {
+            refuse_range(syntax, range_byte);
+            return;
+        }
+        command->extra_pulses = (uint8_t)value;
+        break;
+    case PARAMETER_WAIT: command->start_wait_us = value; break;
+    case PARAMETER_SYNC: flag = MOTION_SYNC; break;
+    case PARAMETER_FULL_STEP: flag = MOTION_PULSES; break;
+    case PARAMETER_PULSES:
+        flag = MOTION_PULSES;
+        on = true;
+        break;
     case PARAMETERS: break; /* not a parameter: the number of them */
+    }
+    if (flag & (MOTION_LINEAR | MOTION_SYNC)) { /* 0 or 1, 1 without a number */
+        if (value > 1) {
+            refuse_range(syntax, range_flag);
+            return;
+        }
+        on = value != 0 || !(number & HAS_DIGIT);
+    }
+    command->flags |= flag;
+    if (!on) {
+        command->flags ^= flag;
     }
 }
 
@@ -218,20 +201,21 @@ static NOINLINE void take_special_digit(motion_syntax_t *syntax, uint8_t digit)
 
 static void take_point(motion_syntax_t *syntax)
 {
-    const number_kind_t kind = (number_kind_t)flash_u8(&parameter_number[syntax->parameter]);
-    if ((kind != NUMBER_FLOOR && kind != NUMBER_RAMP) || (syntax->number & HAS_POINT)) {
+    uint8_t number = syntax->number;
+    if ((number & (POINT | HAS_POINT)) != POINT) {
         refuse(syntax, STATUS_SYNTAX);
         return;
     }
-    syntax->number |= HAS_POINT;
-    if (kind == NUMBER_FLOOR || syntax->value >= 100) {
-        syntax->number |= NO_MORE;
+    number |= HAS_POINT;
+    if (!(number & DECIMALS) || syntax->value >= 100) {
+        number |= NO_MORE;
     }
+    syntax->number = number;
 }
 
 static void take_minus(motion_syntax_t *syntax)
 {
-    if (syntax->parameter != PARAMETER_COUNT || syntax->number != 0) {
+    if (syntax->parameter != PARAMETER_COUNT || (syntax->number & HAS_ANY)) {
         refuse(syntax, STATUS_SYNTAX);
         return;
     }
@@ -247,11 +231,12 @@ static void take_letter(motion_syntax_t *syntax, uint8_t letter)
     }
     if (parameter == PARAMETER_CYCLE) {
         /* c only says how the number of v is meant. */
-        if (syntax->parameter != PARAMETER_VELOCITY || syntax->number != 0) {
+        if (syntax->parameter != PARAMETER_VELOCITY || (syntax->number & HAS_ANY)) {
             refuse(syntax, STATUS_SYNTAX);
             return;
         }
         syntax->parameter = PARAMETER_CYCLE;
+        syntax->number = NUMBER_WHOLE;
         return;
     }
     if (syntax->single) {
@@ -308,13 +293,13 @@ void motion_syntax_take(motion_syntax_t *syntax, char character)
 static void resolve_ramp(motion_syntax_t *syntax)
 {
     motion_command_t *command = &syntax->command;
-    const bool linear = command->flags & MOTION_LINEAR;
-    const bool ramp_given = syntax->given & GIVEN_RAMP;
-    if ((syntax->given & DEFAULT_ACCEL) || (ramp_given && !(syntax->given & GIVEN_ACCEL))) {
-        command->accel = session_default_accel(linear);
+    const uint8_t given = syntax->given;
+    const uint8_t linear = command->flags & MOTION_LINEAR ? 1 : 0;
+    if (command->accel == 0 || (given & (GIVEN_RAMP | GIVEN_ACCEL)) == GIVEN_RAMP) {
+        command->accel = settings.accel[linear];
     }
-    if ((syntax->given & DEFAULT_DECEL) || (ramp_given && !(syntax->given & GIVEN_DECEL))) {
-        command->decel = session_default_decel(linear);
+    if (command->decel == 0 || (given & (GIVEN_RAMP | GIVEN_DECEL)) == GIVEN_RAMP) {
+        command->decel = settings.decel[linear];
     }
 }
 

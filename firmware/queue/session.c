@@ -11,16 +11,6 @@ void session_init(void)
     session_set_pulses(settings.full_step == 0);
 }
 
-accel_code_t session_default_accel(bool linear)
-{
-    return settings.accel[linear];
-}
-
-accel_code_t session_default_decel(bool linear)
-{
-    return settings.decel[linear];
-}
-
 void session_set_linear(bool linear)
 {
     if (linear) {
@@ -28,8 +18,8 @@ void session_set_linear(bool linear)
     } else {
         session.flags &= (uint8_t)~MOTION_LINEAR;
     }
-    session.accel = session_default_accel(linear);
-    session.decel = session_default_decel(linear);
+    session.accel = settings.accel[linear];
+    session.decel = settings.decel[linear];
 }
 
 void session_set_pulses(bool pulses)

@@ -26,10 +26,6 @@ extern session_t session;
 
 void session_init(void); /* from the settings */
 
-/* The system default of a ramp. */
-accel_code_t session_default_accel(bool linear);
-accel_code_t session_default_decel(bool linear);
-
 /* Selects the ramp; accel and decel become the system defaults of that ramp (LIN-013). */
 void session_set_linear(bool linear);
 
