@@ -86,19 +86,25 @@ segment_over:
         rjmp    ring_empty
 1:
         lds     r24, step_flags
-        sbrs    r24, SEGMENT_EARLY_BIT
+        andi    r24, SEGMENT_EARLY_MASK
+        brne    2f
         rjmp    load
         /* Too short a period to reload in: the count ended early, and the periods still due are waited for here. */
 2:      sbis    io(TIFR1), TOV1
         rjmp    2b
         sbi     io(TIFR1), TOV1         /* clears the flag, and only this one (datasheet 14.4.3) */
-        sbrs    r24, SEGMENT_EARLIER_BIT
-        rjmp    load
-        /* Two periods early: what is left to do after the second wait must be over before the period after next. */
+        cpi     r24, 1 << SEGMENT_EARLY_SHIFT
+        breq    load
+        /* What would be too long for the last period is done before it. T = two more waits, not one. */
+        bst     r24, SEGMENT_EARLY_SHIFT
         account
 3:      sbis    io(TIFR1), TOV1
         rjmp    3b
         sbi     io(TIFR1), TOV1
+        brtc    4f
+        clt
+        rjmp    3b
+4:
         ldd     r24, Z + 1
         sts     OCR1AH, r24
         ldd     r24, Z + 0
@@ -150,14 +156,14 @@ ring_empty:
         mov     r24, r30
         sbrc    r24, SEGMENT_SET_DIR_BIT
         rcall   set_dir
-        andi    r24, ~((1 << SEGMENT_EARLY_BIT) | (1 << SEGMENT_EARLIER_BIT) | (1 << SEGMENT_SET_DIR_BIT))
+        andi    r24, ~(SEGMENT_EARLY_MASK | (1 << SEGMENT_SET_DIR_BIT))
         sts     step_flags, r24
         /* Periods of an early-ended segment that are still due are counted as usual. */
-        ldi     r24, 0
-        sbrc    r30, SEGMENT_EARLY_BIT
-        inc     r24
-        sbrc    r30, SEGMENT_EARLIER_BIT
-        inc     r24
+        mov     r24, r30
+        andi    r24, SEGMENT_EARLY_MASK
+        lsr     r24
+        lsr     r24
+        lsr     r24
         out     io(GPIOR0), r24
         tst     r24
         breq    1f

@@ -123,7 +123,7 @@ void step_port_halt(void)
                 TCCR1B = MODE15_B; /* no clock: nothing moves from here on */
                 break;
             }
-            if (s->top < SEGMENT_EARLY_BELOW_TICKS) {
+            if (s->top < SEGMENT_EARLY1_BELOW_TICKS) {
                 /* The pulse is due or there, and over in a moment: freeze right behind it. */
                 while (!(TIFR1 & 1 << TOV1))
                     ;

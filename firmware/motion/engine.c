@@ -20,7 +20,7 @@
 #define CRUISE_GROUP_TICKS 1600u /* shortest run of a cruise whose interval has a fraction */
 #define JOIN_TICKS 12000u         /* before the tail: to plan a command and emit its first intervals */
 #define JOIN_SOON_TICKS 160000u   /* before the tail: when that is done at the earliest */
-#define STARTED_WITH 3u          /* segments in the ring before the timer runs */
+#define START_TICKS 8000u        /* in the ring before the timer runs */
 #define RING_RESERVE 4u          /* segments that one step of emission may need */
 #define STEADY_MOST_GROUPS 12u /* emitted in the short way at a time (ramp.c) */
 #define STEADY_LEAST_Q8 (UNSPLIT_BELOW_TICKS * 256ul) /* of groups too small for an early reload */
@@ -112,17 +112,15 @@ static segment_t *segment_at(uint8_t offset)
 
 static uint8_t early_periods(uint8_t flags)
 {
-    return (uint8_t)(((flags >> SEGMENT_EARLY_BIT) & 1) + ((flags >> SEGMENT_EARLIER_BIT) & 1));
+    return (uint8_t)((flags & SEGMENT_EARLY_MASK) >> SEGMENT_EARLY_SHIFT);
 }
 
 /* Which reload a period of top + 1 ticks needs. */
 static uint8_t early_flags(uint16_t top)
 {
-    if (top >= SEGMENT_EARLY_BELOW_TICKS - 1)
-        return 0;
-    if (top >= SEGMENT_EARLIER_BELOW_TICKS - 1)
-        return 1 << SEGMENT_EARLY_BIT;
-    return 1 << SEGMENT_EARLY_BIT | 1 << SEGMENT_EARLIER_BIT;
+    uint8_t periods = (uint8_t)((top < SEGMENT_EARLY1_BELOW_TICKS - 1) + (top < SEGMENT_EARLY2_BELOW_TICKS - 1) +
+                                (top < SEGMENT_EARLY3_BELOW_TICKS - 1));
+    return (uint8_t)(periods << SEGMENT_EARLY_SHIFT);
 }
 
 /* Periods that the interrupt counts: those waited for early are not among them. */
@@ -231,7 +229,7 @@ static void push(uint16_t periods, uint16_t top, bool pulse, motion_state_t stat
         flags |= early;
         periods = (uint16_t)(periods - early_periods(early));
     } else if (early) {
-        top = SEGMENT_EARLY_BELOW_TICKS - 1;
+        top = SEGMENT_EARLY1_BELOW_TICKS - 1;
     }
     s->top = top;
     s->match = pulse ? (uint16_t)(top - pulse_width_ticks()) : SEGMENT_SILENT;
@@ -336,7 +334,7 @@ static void push_run(uint16_t pulses, uint16_t longer, uint16_t ticks, bool fast
         push(longer, ticks, true, state);
 }
 
-/* push() without its cases: pulses of at least SEGMENT_EARLY_BELOW_TICKS, many more to come. */
+/* push() without its cases: pulses of at least SEGMENT_EARLY1_BELOW_TICKS, many more to come. */
 static inline void append(uint16_t periods, uint16_t top, uint16_t width, uint8_t flags)
 {
     segment_t *s = segment_at(step_head);
@@ -497,7 +495,7 @@ static void begin_closing(void)
     ramp_state = state; /* the body belongs to the phase */
     closing.chunks = chunks;
     closing.ticks_q8 = ticks << 8;
-    tail_fast = chunks == 0 && ticks < SEGMENT_EARLY_BELOW_TICKS;
+    tail_fast = chunks == 0 && ticks < SEGMENT_EARLY1_BELOW_TICKS;
     stage = STAGE_TAIL;
     if (chunks || ticks >= 2 * TAIL_TICKS) {
         if (ticks < 2 * TAIL_TICKS) {
@@ -677,10 +675,19 @@ static void start_now(void)
         play();
     }
     plan();
-    while (!playing && step_head < STARTED_WITH * SEGMENT_BYTES && emit())
-        ;
-    if (!playing)
+    if (!playing) {
+        /* The timer may run as soon as it has enough to do until the next round of the main loop. */
+        uint32_t ticks = 0;
+        uint8_t offset;
+        do {
+            offset = step_head;
+            if (!emit())
+                break;
+            if (offset != step_head)
+                ticks += period_ticks(segment_at(offset)) * counted_periods(segment_at(offset));
+        } while (ticks < START_TICKS);
         play();
+    }
 }
 
 /* Is the velocity in play kept until now? */
@@ -803,7 +810,9 @@ bool engine_poll(void)
         faults |= ENGINE_FAULT_LATE;
     }
     if (playing && step_idle) {
-        if (stage == STAGE_REST && step_head == step_tail) {
+        if (!step_port_snapshot().period_over) {
+            /* The last period is not over. */
+        } else if (stage == STAGE_REST && step_head == step_tail) {
             step_port_halt();
             playing = false;
             tail_valid = false;
@@ -814,14 +823,15 @@ bool engine_poll(void)
                 command = next;
                 start_now();
             }
-        } else if (step_head != step_tail && step_port_snapshot().period_over) {
+        } else if (step_head != step_tail) {
             /* The planner was so late that the timer ran out of segments: go on where it stopped. */
-            faults |= ENGINE_FAULT_STARVED;
+            if (stage == STAGE_RUN)
+                faults |= ENGINE_FAULT_STARVED;
             step_port_start();
         }
         worked = true;
     }
-    if (next_taken && playing && (stage == STAGE_GAP || stage == STAGE_END || stage == STAGE_REST))
+    if (next_taken && playing && !single && (stage == STAGE_GAP || stage == STAGE_END || stage == STAGE_REST))
         join_next();
     /* Until the ring is half full nothing else is as urgent; then a step at a time. */
     if (playing) {
@@ -989,30 +999,25 @@ void engine_next_graceful(void)
         end_command(command.decel, (command.flags & MOTION_LINEAR) != 0);
 }
 
-/* Needs no plan: each pulse is a segment, and the silence behind the last one is taken back for the next. */
+/* Needs no plan: a ring of one segment. A pulse takes 13 us and is waited for before the next one: all of them are made,
+ * as fast as they can be typed at 250,000 Bd. */
 void engine_single_pulse(bool ccw)
 {
-    if (next_taken || (!(single && playing) && running()))
+    if (single) {
+        while (!step_idle || !step_port_snapshot().period_over)
+            ;
+    } else if (running() || next_taken) {
         return;
-    while (single && playing && ring_free() < RING_RESERVE)
-        ; /* 10 us a pulse */
-    if (single && playing && !step_port_drop_after(tail_offset)) {
-        while (!step_idle)
-            ; /* the silence behind the last one has begun: 8 us */
     }
-    if (!single || step_idle)
-        begin_ring();
+    begin_ring();
     stage = STAGE_REST;
     single = true;
     command.flags = ccw ? MOTION_CCW : 0;
-    tail_offset = step_head;
     uint8_t flags = direction_flags(&command, true);
     uint16_t width = pulse_width_ticks();
     append(1, (uint16_t)(TURN_TICKS + width - 1), width, flags);
-    append_silence(1, SHORTEST_PIECE_TICKS - 1, MOTION_STANDBY);
     add_pulses(flags, 1);
-    if (!playing)
-        play();
+    play();
 }
 
 /* -- what others see ------------------------------------------------------------------------------------------------ */

@@ -18,8 +18,8 @@
 
 /* Shared with assembler: plain numbers. */
 #define SEGMENT_STATE_MASK 0x07 /* motion_state_t that the segment belongs to */
-#define SEGMENT_EARLY_BIT 3     /* periods so short that the reload is prepared one period early ... */
-#define SEGMENT_EARLIER_BIT 4   /* ... or two (set together with EARLY) */
+#define SEGMENT_EARLY_SHIFT 3   /* so many periods (2 bits) before its end the reload is begun: they are short */
+#define SEGMENT_EARLY_MASK 0x18
 #define SEGMENT_CCW_BIT 5       /* its pulses count negative */
 #define SEGMENT_DIR_BIT 6       /* level of the dir pin, taken if SET_DIR */
 #define SEGMENT_SET_DIR_BIT 7   /* set dir at the segment's beginning; such a segment has one period */
@@ -28,10 +28,11 @@
 #define SEGMENT_COUNT 32
 #define SEGMENT_SILENT 0xFFFF /* match value that is never reached */
 
-/* Periods below this are not reloaded within themselves: interrupt latency (28) plus the cycles from the flag to the
- * last register (52), with room. docs/design.md */
-#define SEGMENT_EARLY_BELOW_TICKS 96
-#define SEGMENT_EARLIER_BELOW_TICKS 48
+/* Periods below these are not reloaded within themselves but one, two or three periods early: interrupt latency (28)
+ * plus the cycles from the flag to the last register (52), with room. docs/design.md */
+#define SEGMENT_EARLY1_BELOW_TICKS 96
+#define SEGMENT_EARLY2_BELOW_TICKS 48
+#define SEGMENT_EARLY3_BELOW_TICKS 40
 
 #ifndef __ASSEMBLER__
 #include <stdint.h>

