@@ -1,5 +1,5 @@
 /* See wide.h. Cycles with call and return: add, subtract 96; multiply about 20 + 45 per zero-free byte of x and 13 per
- * product of two bytes: 420 for a 32-bit x. Little-endian, arguments by the avr-gcc calling convention. */
+ * product of two bytes: 420 for a 32-bit x; divide about 140 per byte of x; root 1,200; shift 50 per bit. Little-endian, arguments by the avr-gcc calling convention. */
 
         .section .text.wide_add, "ax", @progbits
         .global wide_add
@@ -76,3 +76,135 @@ wide_multiply:                  /* r24 product, r22 x, r20 y */
         pop     r29
         pop     r28
         ret
+
+/* Bit by bit: the remainder takes in one bit of x, and the divisor is taken off where it can be. */
+        .section .text.wide_divide, "ax", @progbits
+        .global wide_divide
+        .type wide_divide, @function
+wide_divide:                    /* r24 x, r20-r23 divisor; returns the remainder in r22-r25 */
+        movw    r30, r24
+        adiw    r30, 8          /* behind the highest byte */
+        movw    r26, r22        /* divisor in r20, r21, r26, r27 */
+        clr     r22             /* remainder */
+        clr     r23
+        clr     r24
+        clr     r25
+        ldi     r19, 8          /* bytes */
+1:      ld      r18, -Z
+        mov     r0, r22         /* nothing there yet: the quotient has a zero */
+        or      r0, r23
+        or      r0, r24
+        or      r0, r25
+        or      r0, r18
+        breq    5f
+        ldi     r18, 8
+        mov     r0, r18
+        ld      r18, Z
+2:      lsl     r18
+        rol     r22
+        rol     r23
+        rol     r24
+        rol     r25
+        brcs    3f
+        cp      r22, r20
+        cpc     r23, r21
+        cpc     r24, r26
+        cpc     r25, r27
+        brlo    4f
+3:      sub     r22, r20
+        sbc     r23, r21
+        sbc     r24, r26
+        sbc     r25, r27
+        inc     r18
+4:      dec     r0
+        brne    2b
+        st      Z, r18
+5:      dec     r19
+        brne    1b
+        ret
+
+/* Two bits of x make one of the root. In r23-r27 twice the root so far, in r18-r22 what it leaves of x. */
+        .section .text.wide_root, "ax", @progbits
+        .global wide_root
+        .type wide_root, @function
+wide_root:                      /* r24 x; returns r22-r25 */
+        push    r16
+        push    r17
+        movw    r30, r24
+        adiw    r30, 8
+        clr     r18
+        clr     r19
+        movw    r20, r18
+        movw    r22, r18
+        movw    r24, r18
+        movw    r26, r18
+        ldi     r17, 8          /* bytes */
+1:      ld      r0, -Z
+        ldi     r16, 4          /* pairs of bits */
+2:      lsl     r0
+        rol     r18
+        rol     r19
+        rol     r20
+        rol     r21
+        rol     r22
+        lsl     r0
+        rol     r18
+        rol     r19
+        rol     r20
+        rol     r21
+        rol     r22
+        lsl     r23
+        rol     r24
+        rol     r25
+        rol     r26
+        rol     r27
+        inc     r23             /* twice the root, and one: what a bit more takes */
+        cp      r18, r23
+        cpc     r19, r24
+        cpc     r20, r25
+        cpc     r21, r26
+        cpc     r22, r27
+        brlo    3f
+        sub     r18, r23
+        sbc     r19, r24
+        sbc     r20, r25
+        sbc     r21, r26
+        sbc     r22, r27
+        inc     r23
+        inc     r23
+3:      dec     r23
+        dec     r16
+        brne    2b
+        dec     r17
+        brne    1b
+        lsr     r27
+        ror     r26
+        ror     r25
+        ror     r24
+        ror     r23
+        mov     r22, r23
+        mov     r23, r24
+        mov     r24, r25
+        mov     r25, r26
+        pop     r17
+        pop     r16
+        ret
+
+        .section .text.wide_shift, "ax", @progbits
+        .global wide_shift
+        .type wide_shift, @function
+wide_shift:                     /* r24 x, r22 bits */
+        movw    r30, r24
+        adiw    r30, 8
+1:      subi    r22, 1
+        brcs    3f
+        ldi     r18, 8
+        clc
+2:      ld      r19, -Z
+        ror     r19
+        st      Z, r19
+        dec     r18
+        brne    2b
+        adiw    r30, 8
+        rjmp    1b
+3:      ret

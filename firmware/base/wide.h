@@ -13,6 +13,9 @@ typedef uint64_t wide_t;
 void wide_add(wide_t *sum, const wide_t *x);           /* sum += x */
 void wide_subtract(wide_t *difference, const wide_t *x); /* difference -= x */
 void wide_multiply(wide_t *product, const wide_t *x, const wide_t *y); /* product = x * y, another object than x, y */
+uint32_t wide_divide(wide_t *x, uint32_t divisor); /* x /= divisor, truncated; returns the remainder. divisor >= 1 */
+uint32_t wide_root(const wide_t *x);               /* sqrt(x), truncated */
+void wide_shift(wide_t *x, uint8_t bits);          /* x >>= bits, without sign; bits < 64 */
 #else
 static inline void wide_add(wide_t *sum, const wide_t *x)
 {
@@ -26,7 +29,39 @@ static inline void wide_multiply(wide_t *product, const wide_t *x, const wide_t 
 {
     *product = *x * *y;
 }
+static inline uint32_t wide_divide(wide_t *x, uint32_t divisor)
+{
+    uint32_t remainder = (uint32_t)(*x % divisor);
+    *x /= divisor;
+    return remainder;
+}
+static inline uint32_t wide_root(const wide_t *x)
+{
+    uint64_t left = *x;
+    uint64_t root = 0;
+    for (uint64_t bit = (uint64_t)1 << 62; bit; bit >>= 2) {
+        uint64_t trial = root + bit;
+        root >>= 1;
+        if (left >= trial) {
+            left -= trial;
+            root += bit;
+        }
+    }
+    return (uint32_t)root;
+}
+static inline void wide_shift(wide_t *x, uint8_t bits)
+{
+    *x >>= bits;
+}
 #endif
+
+/* Half of x: 0 the lower, 1 the upper 32 bits. */
+static inline uint32_t wide_half(const wide_t *x, uint8_t half)
+{
+    uint32_t bits;
+    __builtin_memcpy(&bits, (const uint8_t *)x + 4 * half, sizeof bits);
+    return bits;
+}
 
 /* x / 2^(8 * byte), signed, where that fits 32 bits. byte <= 4. */
 static inline int32_t wide_from_byte(const wide_t *x, uint8_t byte)

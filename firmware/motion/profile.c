@@ -1,8 +1,6 @@
 /* See profile.h. */
 #include "motion/profile.h"
-#include <math.h>
-
-#define LONGEST_RAMP_STEPS 16777216.0f /* two of them times 128 microsteps fit 32 bits */
+#include "base/wide.h"
 
 void profile_basis(profile_basis_t *basis, uint16_t steps_per_rev, uint8_t factor_log2, uint8_t slow_rpm)
 {
@@ -13,7 +11,6 @@ void profile_basis(profile_basis_t *basis, uint16_t steps_per_rev, uint8_t facto
     basis->v_slow = (uint32_t)slow_rpm * 100u << factor_log2;
     ramp_time_t slow = ramp_interval(&basis->ramp, basis->v_slow);
     basis->slow_ticks = slow.ticks + (slow.frac != 0);
-    basis->linear_steps = (float)steps_per_rev * 0.0872664626f; /* pi / 36 */
 }
 
 uint32_t profile_rpm(const profile_basis_t *basis, const motion_command_t *command)
@@ -56,45 +53,76 @@ status_t profile_check(const profile_basis_t *basis, const motion_command_t *com
     return command->count > most ? STATUS_NUMBER_TOO_LARGE : STATUS_OK;
 }
 
-/* floor(V^2 / (2 alpha a)) = RPM^2 * steps_per_rev * pi / (36 * centi): steps from standstill. */
-static uint32_t linear_steps(const profile_basis_t *basis, uint32_t v, uint32_t centi)
+static void multiply(wide_t *x, uint32_t factor)
 {
-    uint32_t centi_rpm = v >> basis->factor_log2;
-    float rpm = (float)centi_rpm * 0.01f;
-    float exact = rpm * rpm * basis->linear_steps / (float)centi;
-    return exact < LONGEST_RAMP_STEPS ? (uint32_t)exact : (uint32_t)LONGEST_RAMP_STEPS;
+    wide_t wide_factor = factor;
+    wide_t product;
+    wide_multiply(&product, x, &wide_factor);
+    *x = product;
+}
+
+static void square(wide_t *x, uint32_t v)
+{
+    wide_t wide_v = v;
+    wide_multiply(x, &wide_v, &wide_v);
+}
+
+static bool is_negative(const wide_t *x)
+{
+    return wide_half(x, 1) > INT32_MAX;
+}
+
+/* floor(V^2 / (2 alpha a)) steps from standstill = (100 RPM)^2 * steps_per_rev * pi / 360000 / centi. Up to 500,000
+ * pulses a second the product fits 64 bits. 9 / 1031324 is pi / 360000 to 3 parts in 10^8. */
+static void linear_steps(wide_t *steps, const profile_basis_t *basis, uint32_t v, uint32_t centi)
+{
+    square(steps, v >> basis->factor_log2);
+    multiply(steps, basis->steps_per_rev * (uint32_t)9);
+    wide_divide(steps, 1031324);
+    wide_divide(steps, centi);
+}
+
+/* Full steps of a ramp between two velocities. */
+static void ramp_steps(wide_t *steps, const profile_basis_t *basis, uint32_t v_from, uint32_t v_to, uint32_t centi,
+                       bool linear)
+{
+    if (v_from > v_to) {
+        uint32_t v = v_from;
+        v_from = v_to;
+        v_to = v;
+    }
+    if (!linear) {
+        *steps = ((v_to - v_from) >> basis->factor_log2) / centi;
+        return;
+    }
+    linear_steps(steps, basis, v_to, centi);
+    if (v_from) {
+        wide_t from;
+        linear_steps(&from, basis, v_from, centi);
+        wide_subtract(steps, &from);
+    }
 }
 
 uint32_t profile_ramp_steps(const profile_basis_t *basis, uint32_t v_from, uint32_t v_to, uint32_t centi, bool linear)
 {
-    if (!linear) {
-        uint32_t change = (v_from > v_to ? v_from - v_to : v_to - v_from) >> basis->factor_log2;
-        if (centi == 100 && change % 100u == 0 && change < 65536u)
-            return (uint16_t)change / 100u; /* the factory value: a short division */
-        return change / centi;
-    }
-    uint32_t from = linear_steps(basis, v_from, centi);
-    uint32_t to = linear_steps(basis, v_to, centi);
-    return from > to ? from - to : to - from;
+    wide_t steps;
+    ramp_steps(&steps, basis, v_from, v_to, centi, linear);
+    return wide_half(&steps, 1) ? UINT32_MAX : wide_half(&steps, 0);
 }
 
-/* a * b / divisor, truncated; of large ones to the precision of a float, which is enough for a ratio. */
-static uint32_t scale(uint32_t a, uint32_t b, uint32_t divisor)
+/* Change of v^2 over so many pulses of a linear ramp, in units^2: 2 * alpha * accel = 114591.559 centi F / sprf each. */
+static void square_change(wide_t *change, const profile_basis_t *basis, uint32_t pulses, uint32_t centi)
 {
-    if (a < 65536u && b < 65536u)
-        return a * b / divisor;
-    return (uint32_t)((float)a * (float)b / (float)divisor);
+    *change = pulses;
+    multiply(change, centi << basis->factor_log2);
+    multiply(change, 916732); /* 8 * 114591.559 to 5 parts in 10^7 */
+    wide_divide(change, basis->steps_per_rev);
+    wide_shift(change, 3);
 }
 
-/* Change of v^2 per pulse of a linear ramp, in units^2: 2 * alpha * accel. */
-static float square_per_pulse(const profile_basis_t *basis, uint32_t centi)
+static uint32_t root(const wide_t *x)
 {
-    return 114591.559f * (float)centi * (float)(1u << basis->factor_log2) / (float)basis->steps_per_rev;
-}
-
-static uint32_t root(float square)
-{
-    return square > 0.0f ? (uint32_t)(sqrtf(square) + 0.5f) : 0;
+    return is_negative(x) ? 0 : wide_root(x);
 }
 
 /* The velocity that the acceleration reaches (v_peak), and that of its last interval. */
@@ -105,17 +133,24 @@ static uint32_t reached(profile_t *profile, const profile_basis_t *basis, uint32
     uint32_t pulses = profile->accel_pulses;
     bool faster = profile->faster;
     if (profile->linear) {
-        float per_pulse = square_per_pulse(basis, profile->accel_centi);
-        float square = 0.0f;
+        wide_t v2 = 0;
+        wide_t change;
         if (profile->v_start != basis->v_slow || !faster)
-            square = (float)profile->v_start * (float)profile->v_start;
-        if (!faster)
-            per_pulse = -per_pulse;
-        square += (float)pulses * per_pulse;
-        v_peak = root(square);
-        v_last = root(square - 0.5f * per_pulse);
+            square(&v2, profile->v_start);
+        square_change(&change, basis, pulses, profile->accel_centi);
+        if (faster)
+            wide_add(&v2, &change);
+        else
+            wide_subtract(&v2, &change);
+        v_peak = root(&v2);
+        square_change(&change, basis, 1, profile->accel_centi);
+        if (faster)
+            wide_subtract(&v2, &change);
+        else
+            wide_add(&v2, &change);
+        v_last = (v_peak + root(&v2)) / 2; /* the mean of its two ends */
     } else {
-        uint32_t step = faster ? profile->accel_centi : -profile->accel_centi;
+        uint32_t step = faster ? profile->accel_centi : 0u - profile->accel_centi;
         v_peak = profile->v_start + step * pulses;
         v_last = v_peak - step;
     }
@@ -149,38 +184,49 @@ void profile_plan(profile_t *profile, const profile_basis_t *basis, const motion
 
     /* Within the slow range there are no ramps (manual lines 159, 169). */
     bool ramps = v_target > v_slow;
-    uint32_t accel = 0;
-    uint32_t decel = 0;
+    wide_t wide_accel = 0;
+    wide_t wide_decel = 0;
     if (ramps && command->accel != ACCEL_NONE && v_start != v_target) {
         uint32_t from = v_start;
         if (profile->linear && v_start == v_slow)
             from = 0; /* a linear ramp starts from zero (decisions 0.2.4) */
-        accel = profile_ramp_steps(basis, from, v_target, profile->accel_centi, profile->linear);
+        ramp_steps(&wide_accel, basis, from, v_target, profile->accel_centi, profile->linear);
     }
     if (ramps && command->decel != ACCEL_NONE)
-        decel = profile_ramp_steps(basis, profile->linear ? 0 : v_slow, v_target, profile->decel_centi,
-                                   profile->linear);
+        ramp_steps(&wide_decel, basis, profile->linear ? 0 : v_slow, v_target, profile->decel_centi, profile->linear);
 
     /* Full steps are truncated as full steps, so that a ramp covers the same steps whatever the factor. */
     uint8_t after_log2 = factor_log2;
     if (command->flags & MOTION_PULSES) {
-        accel <<= factor_log2;
-        decel <<= factor_log2;
-        after_log2 = 0;
+        while (after_log2) {
+            wide_add(&wide_accel, &wide_accel);
+            wide_add(&wide_decel, &wide_decel);
+            after_log2--;
+        }
     }
+    /* Ramps beyond any command keep their ratio. */
+    bool truncated = false;
+    while (wide_half(&wide_accel, 1) || wide_half(&wide_decel, 1) ||
+           (uint32_t)wide_accel > UINT32_MAX - (uint32_t)wide_decel) {
+        wide_shift(&wide_accel, 1);
+        wide_shift(&wide_decel, 1);
+        truncated = true;
+    }
+    uint32_t accel = (uint32_t)wide_accel;
+    uint32_t decel = (uint32_t)wide_decel;
     uint32_t total = command->count;
-    uint32_t cruise;
-    bool truncated = accel > total || decel > total - accel;
+    uint32_t whole = accel + decel;
+    uint32_t cruise = 0;
+    if (whole > total)
+        truncated = true;
     if (truncated) {
-        uint32_t whole = accel + decel;
-        uint32_t scaled = scale(decel, total, whole);
+        uint32_t scaled = ramp_scale(decel, total, whole);
         if (scaled > 1)
-            scaled = total - scale(accel, total, whole);
+            scaled = total - ramp_scale(accel, total, whole);
         decel = scaled;
         accel = total - decel;
-        cruise = 0;
     } else {
-        cruise = total - accel - decel;
+        cruise = total - whole;
     }
     profile->accel_pulses = accel << after_log2;
     profile->decel_pulses = decel << after_log2;
@@ -195,11 +241,15 @@ void profile_plan(profile_t *profile, const profile_basis_t *basis, const motion
     if (profile->decel_pulses != 0) {
         profile->v_exit = v_slow;
         if (profile->linear) {
-            /* v^2 that the deceleration can take off, against what it has to */
-            float able = (float)profile->decel_pulses * square_per_pulse(basis, profile->decel_centi);
-            float needed = (float)profile->v_peak * (float)profile->v_peak;
-            profile->steep_decel = needed > able * 1.02f + 4.0f * square_per_pulse(basis, profile->decel_centi) *
-                                                                (float)(1u << factor_log2);
+            /* Can the deceleration, and 2 % and four full steps more of it, take off v^2? */
+            wide_t able;
+            wide_t needed;
+            square_change(&able, basis,
+                          profile->decel_pulses + profile->decel_pulses / 50 + ((uint32_t)4 << factor_log2),
+                          profile->decel_centi);
+            square(&needed, profile->v_peak);
+            wide_subtract(&able, &needed);
+            profile->steep_decel = is_negative(&able);
         } else {
             profile->steep_decel =
                 profile->v_peak - v_slow > profile->decel_centi * (profile->decel_pulses + ((uint32_t)1 << factor_log2));
@@ -244,11 +294,17 @@ void profile_begin_accel(const profile_t *profile, const profile_basis_t *basis,
     wide_t rest = 0;
     ramp_linear_c(&c, basis->steps_per_rev, basis->factor_log2, profile->accel_centi);
     if (profile->v_start != basis->v_slow || !profile->faster) {
-        /* From zero to v_start: v / accel = RPM * pi / 30 / (centi / 100) s = units / (100 F) * 2.680826e9 / centi */
-        ramp_from_float(&t, (float)profile->v_start * 26808257.0f /
-                                ((float)profile->accel_centi * (float)(1u << basis->factor_log2)));
+        /* From zero to v_start: v / accel = RPM * pi / 30 / (centi / 100) s = units / (100 F) * 2.680825731e9 / centi
+         * sixteenths of a tick */
+        t = profile->v_start;
+        multiply(&t, 2680825731u);
+        wide_divide(&t, profile->accel_centi * 100u << basis->factor_log2);
     }
-    ramp_begin_linear(ramp, &c, &t, &rest, profile->faster, UINT32_MAX >> 8);
+    ramp_begin_linear(ramp, &c, &t, &rest, profile->faster, 0);
+    /* Whole full steps may pass the target a little: not beyond the interval of the cruise. */
+    ramp->bound_q8 = profile->cruise.chunks >> (32 - PROFILE_CHUNK_LOG2 - 8)
+                         ? UINT32_MAX
+                         : (profile->cruise.chunks << (PROFILE_CHUNK_LOG2 + 8)) + profile->cruise.ticks_q8;
 }
 
 void profile_begin_decel(const profile_t *profile, const profile_basis_t *basis, ramp_t *ramp)
@@ -264,12 +320,15 @@ void profile_begin_decel(const profile_t *profile, const profile_basis_t *basis,
     wide_t c;
     wide_t t;
     wide_t rest;
-    ramp_linear_c(&c, basis->steps_per_rev, basis->factor_log2, profile->decel_centi);
     if (profile->steep_decel) {
         /* From v_peak to zero in n pulses: t = 2 n interval(v_peak), C = t^2 / n. */
-        float interval_q4 = basis->ramp.k512 / 32.0f / (float)profile->v_peak;
-        ramp_from_float(&c, 4.0f * (float)n * interval_q4 * interval_q4);
+        ramp_time_t interval = ramp_interval(&basis->ramp, profile->v_peak);
+        square(&c, interval.ticks << 4 | interval.frac >> 4);
+        multiply(&c, n << 2);
+    } else {
+        ramp_linear_c(&c, basis->steps_per_rev, basis->factor_log2, profile->decel_centi);
     }
     ramp_linear_time(&t, &c, n, &rest);
-    ramp_begin_linear(ramp, &c, &t, &rest, false, basis->slow_ticks);
+    ramp_begin_linear(ramp, &c, &t, &rest, false, 0);
+    ramp_bound(ramp, &basis->ramp, basis->v_slow);
 }

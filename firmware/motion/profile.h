@@ -48,7 +48,6 @@ typedef struct {
     uint32_t us_rpm;     /* microseconds * RPM per full step: 60e6 / steps per revolution */
     uint32_t v_slow;     /* slow speed in units */
     uint32_t slow_ticks; /* its interval, rounded up */
-    float linear_steps;  /* full steps * centi / RPM^2 of the linear ramp: steps_per_rev * pi / 36 */
     uint16_t steps_per_rev;
     uint8_t factor_log2; /* microsteps per full step */
 } profile_basis_t;

@@ -25,40 +25,41 @@ typedef struct {
 
 /* Depends on steps per revolution: 2 * 256 * K, K = 96e9 / steps_per_rev (ticks times velocity units). */
 typedef struct {
-    float k512;
-    uint32_t k512_low; /* modulo 2^32 */
-    uint32_t v2_least; /* twice the velocity below which k512 / v2 needs more than 31 bits */
+    wide_t k512;
 } ramp_constants_t;
 
 typedef struct {
     bool linear;
     bool faster;          /* velocity grows from pulse to pulse */
     uint8_t steady;       /* groups that may follow in the same way before their size is reviewed */
-    uint8_t group_log2;   /* of a steady group */
+    uint8_t group_log2;   /* of the last group's pulses, rounded down */
+    uint8_t seen;         /* groups of one size so far that followed each other; from 3 on slope and curve are right */
     uint16_t excess_q8;   /* what a steady group's sum exceeds its middle times its pulses by */
-    uint16_t group;       /* pulses of the last group; 0: none yet */
+    uint16_t group;       /* pulses of the last group */
     uint16_t group_limit; /* what the next group would like to be */
-    uint32_t max_ticks;   /* linear: no interval above while slowing */
+    uint32_t bound_q8;    /* linear: no interval above while slowing, none below while speeding up */
+    uint8_t bound_q16;    /* its next eight bits: 1/65536 tick */
+    uint8_t bound_carry;  /* of those */
     union {
         struct {
-            uint32_t next2; /* twice the velocity of the next pulse */
-            uint32_t cap2;  /* never above */
-            uint32_t step;  /* change of velocity per pulse */
+            uint32_t q8;       /* interval in the middle of the last group */
+            int32_t slope;     /* change of q8 from the group before */
+            int32_t curve;     /* change of slope, likewise */
+            uint32_t next2;    /* twice the velocity of the next pulse */
+            uint32_t cap2;     /* never above */
+            uint32_t step;     /* change of velocity per pulse */
             uint32_t spacing2; /* change of mid2 from group to group, modulo 2^32 */
-            uint32_t mid2;  /* twice the velocity in the middle of the last group */
-            uint32_t q8;    /* interval there */
-            int32_t rest;   /* k512 - q8 * mid2, exact */
-            int32_t slope;  /* change of q8 from the group before */
-            int32_t curve;    /* change of slope, likewise */
+            uint32_t mid2;     /* twice the velocity in the middle of the last group */
+            uint32_t k512;     /* modulo 2^32: k512 - q8 * mid2, at most half of mid2, is the exact remainder */
         } harmonic;
         struct {
-            wide_t t_q4;       /* time from standstill at the next pulse */
-            wide_t c_q8;       /* C */
-            wide_t group_c;    /* C times the group's pulses */
-            wide_t rest;       /* faster: k * C - t^2; slower: t^2 - k * C; exact, signed, small */
-            uint32_t sum_q4;   /* duration of the last group */
-            int32_t slope_q4;  /* its change from the group before */
-            int32_t curve_q4;  /* change of slope, likewise */
+            uint32_t sum_q4; /* duration of the last group */
+            int32_t slope;   /* its change from the group before */
+            int32_t curve;   /* change of slope, likewise */
+            wide_t t2_q4;    /* twice the time from standstill at the next pulse */
+            wide_t rest;     /* faster: k * C - t^2; slower: t^2 - k * C; exact, from 0 to t2 */
+            wide_t group_c;  /* C times the group's pulses */
+            wide_t c_q8;     /* C */
         } linear;
     } u;
 } ramp_t;
@@ -77,9 +78,13 @@ void ramp_begin_harmonic(ramp_t *ramp, const ramp_constants_t *constants, uint32
                          uint32_t v_cap);
 
 /* Linear ramp with C = c_q8 / 256 ticks^2 per pulse, beginning at the time t_q4 / 16 ticks from standstill, which is
- * off by `rest` (ramp_linear_time). A slowing one never has an interval above max_ticks. */
+ * off by `rest` (ramp_linear_time). A slowing one never has an interval above max_ticks; what bound_q8 is set to
+ * afterwards takes its place. */
 void ramp_begin_linear(ramp_t *ramp, const wide_t *c_q8, const wide_t *t_q4, const wide_t *rest, bool faster,
                        uint32_t max_ticks);
+
+/* The bound of a linear ramp that slows down: the interval at velocity v. */
+void ramp_bound(ramp_t *ramp, const ramp_constants_t *constants, uint32_t v);
 
 /* C for a ramp value in hundredths of rad/s^2. factor_log2: microsteps per full step. */
 void ramp_linear_c(wide_t *c_q8, uint16_t steps_per_rev, uint8_t factor_log2, uint32_t accel_centi);
@@ -87,11 +92,12 @@ void ramp_linear_c(wide_t *c_q8, uint16_t steps_per_rev, uint8_t factor_log2, ui
 /* t from standstill to n pulses: sqrt(n * C), to one unit of 1/16 tick; *rest = n * C - t^2, what was rounded off. */
 void ramp_linear_time(wide_t *t_q4, const wide_t *c_q8, uint32_t n, wide_t *rest);
 
-/* f >= 0, truncated. */
-void ramp_from_float(wide_t *x, float f);
+/* a * b / divisor, truncated, where that fits 32 bits. divisor >= 1. */
+uint32_t ramp_scale(uint32_t a, uint32_t b, uint32_t divisor);
 
-/* While ramp->steady and at least two groups are left: the next group in a short way. steady is counted down by the
- * caller. Returns the sum of its intervals in 1/256 ticks, less excess_q8; it has ramp->group pulses, a power of two. */
+/* While ramp->steady and at least two groups are left: the next group in a short way, of either law. steady is counted
+ * down by the caller. Returns the sum of its intervals in 1/256 ticks, less excess_q8; it has ramp->group pulses, a
+ * power of two, at least 4 where the intervals are shorter than 128 ticks. */
 uint32_t ramp_step(ramp_t *ramp);
 
 /* The next group of at most `left` pulses: returns how many (>= 1) and the sum of their intervals. */

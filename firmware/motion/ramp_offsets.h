@@ -2,13 +2,19 @@
 #ifndef MOTION_RAMP_OFFSETS_H
 #define MOTION_RAMP_OFFSETS_H
 
+#define RAMP_LINEAR 0
+#define RAMP_FASTER 1
 #define RAMP_GROUP_LOG2 3
-#define RAMP_NEXT2 14
-#define RAMP_SPACING2 26
-#define RAMP_MID2 30
-#define RAMP_Q8 34
-#define RAMP_REST 38
-#define RAMP_SLOPE 42
-#define RAMP_CURVE 46
+/* Both laws: the last value, its change, the change of that. */
+#define RAMP_Q8 17
+#define RAMP_SLOPE 21
+#define RAMP_CURVE 25
+#define RAMP_NEXT2 29
+#define RAMP_SPACING2 41
+#define RAMP_MID2 45
+#define RAMP_K512 49
+#define RAMP_T2 29
+#define RAMP_REST 37
+#define RAMP_GROUP_C 45
 
 #endif

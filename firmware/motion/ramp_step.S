@@ -1,71 +1,183 @@
-/* ramp_step() of ramp.h for the AVR: the harmonic ramp's steady state, about 330 cycles with call and return.
+/* ramp_step() of ramp.h for the AVR: a ramp's steady state, with call and return about 230 cycles (harmonic) and
+ * 640 cycles (linear), and 20 or 50 more for each correction.
  *
- *   mid2 += spacing2;  slope += curve;  rest -= spacing2 * q8 (old) + slope * mid2 (new);
- *   while rest is not within half of mid2: rest -+= mid2, slope and curve +-= 1;
- *   q8 += slope;  next2 += spacing2;  return q8 << group_log2
+ *   slope += curve;  q += slope
+ *   harmonic: mid2 += spacing2;  next2 += spacing2;  rest = k512 + mid2 / 2 - q * mid2;
+ *             while rest is not in 0..mid2 - 1: rest -+= mid2, one correction;  return q << group_log2
+ *   linear:   t2 +-= q;  rest += group_c - q * t2;  t2 +-= q;
+ *             while rest is not in 0..t2 - 1: t2 +-= 1, rest -+= t2, t2 +-= 1, one correction;  return q << 4
+ *   q, slope and curve += corrections
  *
- * All modulo 2^32; the C version in ramp.c is what runs on the host, and the tests compare the two. */
+ * Modulo 2^32, t2 and rest modulo 2^64; the C version in ramp.c is what runs on the host. */
 #include "motion/ramp_offsets.h"
 
-/* r4-r7 -= r18-r21 * r22-r25, r3 = 0 */
-.macro multiply_subtract
-        mul     r18, r22
-        sub     r4, r0
-        sbc     r5, r1
-        sbc     r6, r3
-        sbc     r7, r3
-        mul     r18, r23
-        sub     r5, r0
-        sbc     r6, r1
-        sbc     r7, r3
-        mul     r19, r22
-        sub     r5, r0
-        sbc     r6, r1
-        sbc     r7, r3
-        mul     r18, r24
-        sub     r6, r0
-        sbc     r7, r1
-        mul     r19, r23
-        sub     r6, r0
-        sbc     r7, r1
-        mul     r20, r22
-        sub     r6, r0
-        sbc     r7, r1
-        mul     r18, r25
-        sub     r7, r0
-        mul     r19, r24
-        sub     r7, r0
-        mul     r20, r23
-        sub     r7, r0
-        mul     r21, r22
-        sub     r7, r0
+.macro load4 a, b, c, d, offset
+        ldd     \a, Z + \offset
+        ldd     \b, Z + \offset + 1
+        ldd     \c, Z + \offset + 2
+        ldd     \d, Z + \offset + 3
 .endm
 
-.macro load4 first, offset
-        ldd     r\first, Y + \offset
-        .if \first == 18
-        ldd     r19, Y + \offset + 1
-        ldd     r20, Y + \offset + 2
-        ldd     r21, Y + \offset + 3
-        .elseif \first == 22
-        ldd     r23, Y + \offset + 1
-        ldd     r24, Y + \offset + 2
-        ldd     r25, Y + \offset + 3
-        .elseif \first == 4
-        ldd     r5, Y + \offset + 1
-        ldd     r6, Y + \offset + 2
-        ldd     r7, Y + \offset + 3
-        .elseif \first == 8
-        ldd     r9, Y + \offset + 1
-        ldd     r10, Y + \offset + 2
-        ldd     r11, Y + \offset + 3
-        .endif
+.macro store4 a, b, c, d, offset
+        std     Z + \offset, \a
+        std     Z + \offset + 1, \b
+        std     Z + \offset + 2, \c
+        std     Z + \offset + 3, \d
+.endm
+
+/* r22-r25 += r18-r21 */
+.macro add4
+        add     r22, r18
+        adc     r23, r19
+        adc     r24, r20
+        adc     r25, r21
 .endm
 
         .section .text.ramp_step, "ax", @progbits
         .global ramp_step
         .type ramp_step, @function
 ramp_step:
+        push    r12
+        push    r13
+        push    r14
+        push    r15
+        push    r16
+        push    r17
+        movw    r30, r24
+        load4   r22, r23, r24, r25, RAMP_SLOPE
+        load4   r18, r19, r20, r21, RAMP_CURVE
+        add4
+        store4  r22, r23, r24, r25, RAMP_SLOPE
+        load4   r18, r19, r20, r21, RAMP_Q8
+        add4
+        store4  r22, r23, r24, r25, RAMP_Q8
+        ld      r18, Z
+        tst     r18
+        breq    harmonic
+        rjmp    linear
+
+        /* q in r22-r25, mid2 in r18-r21, rest in r12-r15, corrections in r26, r27, 0 in r16 */
+harmonic:
+        clr     r16
+        load4   r18, r19, r20, r21, RAMP_NEXT2
+        load4   r12, r13, r14, r15, RAMP_SPACING2
+        add     r18, r12
+        adc     r19, r13
+        adc     r20, r14
+        adc     r21, r15
+        store4  r18, r19, r20, r21, RAMP_NEXT2
+        load4   r18, r19, r20, r21, RAMP_MID2
+        add     r18, r12
+        adc     r19, r13
+        adc     r20, r14
+        adc     r21, r15
+        store4  r18, r19, r20, r21, RAMP_MID2
+        movw    r12, r18
+        movw    r14, r20
+        lsr     r15
+        ror     r14
+        ror     r13
+        ror     r12
+        ldd     r0, Z + RAMP_K512
+        add     r12, r0
+        ldd     r0, Z + RAMP_K512 + 1
+        adc     r13, r0
+        ldd     r0, Z + RAMP_K512 + 2
+        adc     r14, r0
+        ldd     r0, Z + RAMP_K512 + 3
+        adc     r15, r0
+        mul     r18, r22
+        sub     r12, r0
+        sbc     r13, r1
+        sbc     r14, r16
+        sbc     r15, r16
+        mul     r18, r23
+        sub     r13, r0
+        sbc     r14, r1
+        sbc     r15, r16
+        mul     r19, r22
+        sub     r13, r0
+        sbc     r14, r1
+        sbc     r15, r16
+        mul     r18, r24
+        sub     r14, r0
+        sbc     r15, r1
+        mul     r19, r23
+        sub     r14, r0
+        sbc     r15, r1
+        mul     r20, r22
+        sub     r14, r0
+        sbc     r15, r1
+        mul     r18, r25
+        sub     r15, r0
+        mul     r19, r24
+        sub     r15, r0
+        mul     r20, r23
+        sub     r15, r0
+        mul     r21, r22
+        sub     r15, r0
+
+        clr     r26
+        clr     r27
+        tst     r15
+        brpl    2f
+1:      sbiw    r26, 1
+        add     r12, r18
+        adc     r13, r19
+        adc     r14, r20
+        adc     r15, r21
+        brmi    1b
+2:      cp      r12, r18
+        cpc     r13, r19
+        cpc     r14, r20
+        cpc     r15, r21
+        brlo    3f
+        adiw    r26, 1
+        sub     r12, r18
+        sbc     r13, r19
+        sbc     r14, r20
+        sbc     r15, r21
+        rjmp    2b
+3:      rcall   correct
+        ldd     r18, Z + 4 + RAMP_GROUP_LOG2
+shift:  subi    r18, 1
+        brcs    leave
+        lsl     r22
+        rol     r23
+        rol     r24
+        rol     r25
+        rjmp    shift
+leave:  clr     r1
+        pop     r17
+        pop     r16
+        pop     r15
+        pop     r14
+        pop     r13
+        pop     r12
+        ret
+
+/* Adds r27:r26 to curve, slope and q; returns q in r22-r25 and leaves 4 less in Z. */
+correct:
+        movw    r12, r26
+        clr     r14
+        sbrc    r13, 7
+        com     r14
+        mov     r15, r14
+        adiw    r30, RAMP_CURVE - RAMP_Q8
+        rcall   5f
+        rcall   5f
+5:      load4   r22, r23, r24, r25, RAMP_Q8
+        add     r22, r12
+        adc     r23, r13
+        adc     r24, r14
+        adc     r25, r15
+        store4  r22, r23, r24, r25, RAMP_Q8
+        sbiw    r30, RAMP_SLOPE - RAMP_Q8
+        ret
+
+        /* rest in r2-r9, t2 in r10-r17, q in r22-r25, 0 in r26 */
+linear:
+        push    r2
         push    r3
         push    r4
         push    r5
@@ -75,137 +187,122 @@ ramp_step:
         push    r9
         push    r10
         push    r11
-        push    r28
-        push    r29
-        movw    r28, r24
-        clr     r3
+        clr     r26
+        load4   r10, r11, r12, r13, RAMP_T2
+        load4   r14, r15, r16, r17, RAMP_T2 + 4
+        rcall   move_t2
+        load4   r2, r3, r4, r5, RAMP_REST
+        load4   r6, r7, r8, r9, RAMP_REST + 4
+        load4   r18, r19, r20, r21, RAMP_GROUP_C
+        add     r2, r18
+        adc     r3, r19
+        adc     r4, r20
+        adc     r5, r21
+        load4   r18, r19, r20, r21, RAMP_GROUP_C + 4
+        adc     r6, r18
+        adc     r7, r19
+        adc     r8, r20
+        adc     r9, r21
+        adiw    r30, RAMP_Q8
 
-        load4   18, RAMP_SPACING2
-        load4   8, RAMP_NEXT2
-        add     r8, r18
-        adc     r9, r19
-        adc     r10, r20
-        adc     r11, r21
-        std     Y + RAMP_NEXT2, r8
-        std     Y + RAMP_NEXT2 + 1, r9
-        std     Y + RAMP_NEXT2 + 2, r10
-        std     Y + RAMP_NEXT2 + 3, r11
-        load4   8, RAMP_Q8
-        movw    r22, r8
-        movw    r24, r10
-        load4   4, RAMP_REST
-        multiply_subtract
+.macro column t2, rest
+        mul     r19, \t2
+        add     r0, r27
+        adc     r1, r26
+        sub     \rest, r0
+        adc     r1, r26
+        mov     r27, r1
+.endm
+        /* rest -= q * t2, a byte of q after the other; after each, the lowest byte of rest is done with and moves into
+         * r22-r25, the others move down. Carry in r27. */
+        ldi     r20, 4
+1:      ld      r19, Z+
+        tst     r19
+        breq    2f
+        clr     r27
+        column  r10, r2
+        column  r11, r3
+        column  r12, r4
+        column  r13, r5
+        column  r14, r6
+        column  r15, r7
+        column  r16, r8
+        mul     r19, r17
+        add     r0, r27
+        sub     r9, r0
+2:      mov     r22, r23
+        mov     r23, r24
+        mov     r24, r25
+        mov     r25, r2
+        mov     r2, r3
+        mov     r3, r4
+        mov     r4, r5
+        mov     r5, r6
+        mov     r6, r7
+        mov     r7, r8
+        mov     r8, r9
+        dec     r20
+        brne    1b
+        movw    r8, r4
+        movw    r6, r2
+        movw    r2, r22
+        movw    r4, r24
+        sbiw    r30, RAMP_Q8 + 4
+        load4   r22, r23, r24, r25, RAMP_Q8
+        rcall   move_t2
 
-        load4   22, RAMP_MID2
-        add     r22, r18
-        adc     r23, r19
-        adc     r24, r20
-        adc     r25, r21
-        std     Y + RAMP_MID2, r22
-        std     Y + RAMP_MID2 + 1, r23
-        std     Y + RAMP_MID2 + 2, r24
-        std     Y + RAMP_MID2 + 3, r25
-
-        load4   18, RAMP_SLOPE
-        ldd     r0, Y + RAMP_CURVE
-        add     r18, r0
-        ldd     r0, Y + RAMP_CURVE + 1
-        adc     r19, r0
-        ldd     r0, Y + RAMP_CURVE + 2
-        adc     r20, r0
-        ldd     r0, Y + RAMP_CURVE + 3
-        adc     r21, r0
-        multiply_subtract
-
-        /* half of mid2 in r26, r27, r30, r31; r1:r0 counts corrections */
-        movw    r26, r22
-        movw    r30, r24
-        lsr     r31
-        ror     r30
-        ror     r27
-        ror     r26
-        clr     r0
-        clr     r1
-1:      cp      r26, r4                 /* rest > half? */
-        cpc     r27, r5
-        cpc     r30, r6
-        cpc     r31, r7
-        brge    2f
-        sub     r4, r22
-        sbc     r5, r23
-        sbc     r6, r24
-        sbc     r7, r25
-        sec                             /* r1:r0 += 1 */
-        adc     r0, r3
-        adc     r1, r3
-        rjmp    1b
-2:      add     r26, r4                 /* rest < -half?  rest + half < 0 */
-        adc     r27, r5
-        adc     r30, r6
-        adc     r31, r7
-        brpl    4f
-        add     r4, r22
-        adc     r5, r23
-        adc     r6, r24
-        adc     r7, r25
-        sec
-        sbc     r0, r3
-        sbc     r1, r3
-        movw    r26, r22
-        movw    r30, r24
-        lsr     r31
-        ror     r30
-        ror     r27
-        ror     r26
-        rjmp    2b
-4:      std     Y + RAMP_REST, r4
-        std     Y + RAMP_REST + 1, r5
-        std     Y + RAMP_REST + 2, r6
-        std     Y + RAMP_REST + 3, r7
-        /* sign-extend the corrections into r4-r7 */
-        movw    r4, r0
-        clr     r6
-        sbrc    r5, 7
-        com     r6
-        mov     r7, r6
-        /* slope: it was used up as a factor, so once more */
-        load4   18, RAMP_CURVE
-        load4   22, RAMP_SLOPE
-        add     r18, r4
-        adc     r19, r5
-        adc     r20, r6
-        adc     r21, r7
-        std     Y + RAMP_CURVE, r18
-        std     Y + RAMP_CURVE + 1, r19
-        std     Y + RAMP_CURVE + 2, r20
-        std     Y + RAMP_CURVE + 3, r21
-        add     r22, r18
-        adc     r23, r19
-        adc     r24, r20
-        adc     r25, r21
-        std     Y + RAMP_SLOPE, r22
-        std     Y + RAMP_SLOPE + 1, r23
-        std     Y + RAMP_SLOPE + 2, r24
-        std     Y + RAMP_SLOPE + 3, r25
-        add     r22, r8
-        adc     r23, r9
-        adc     r24, r10
-        adc     r25, r11
-        std     Y + RAMP_Q8, r22
-        std     Y + RAMP_Q8 + 1, r23
-        std     Y + RAMP_Q8 + 2, r24
-        std     Y + RAMP_Q8 + 3, r25
-        ldd     r18, Y + RAMP_GROUP_LOG2
-5:      subi    r18, 1
-        brcs    6f
-        lsl     r22
-        rol     r23
-        rol     r24
-        rol     r25
-        rjmp    5b
-6:      clr     r1
-        pop     r29
-        pop     r28
+        ldi     r20, 1                  /* 1, or -1 when slowing, in r20 and r21 */
+        clr     r21
+        ldd     r18, Z + RAMP_FASTER
+        tst     r18
+        brne    3f
+        rcall   negate_one
+3:      clr     r27
+        ldi     r18, 255                /* corrections at most */
+4:      tst     r9
+        brpl    5f
+        sbiw    r26, 1
+        rcall   negate_one
+        rcall   step_t2
+        add     r2, r10
+        adc     r3, r11
+        adc     r4, r12
+        adc     r5, r13
+        adc     r6, r14
+        adc     r7, r15
+        adc     r8, r16
+        adc     r9, r17
+        rcall   step_t2
+        rcall   negate_one
+        rjmp    6f
+5:      cp      r2, r10
+        cpc     r3, r11
+        cpc     r4, r12
+        cpc     r5, r13
+        cpc     r6, r14
+        cpc     r7, r15
+        cpc     r8, r16
+        cpc     r9, r17
+        brlo    7f
+        adiw    r26, 1
+        rcall   step_t2
+        sub     r2, r10
+        sbc     r3, r11
+        sbc     r4, r12
+        sbc     r5, r13
+        sbc     r6, r14
+        sbc     r7, r15
+        sbc     r8, r16
+        sbc     r9, r17
+        rcall   step_t2
+6:      dec     r18
+        brne    4b
+7:      store4  r2, r3, r4, r5, RAMP_REST
+        store4  r6, r7, r8, r9, RAMP_REST + 4
+        store4  r10, r11, r12, r13, RAMP_T2
+        store4  r14, r15, r16, r17, RAMP_T2 + 4
+        rcall   correct
+        ldi     r18, 4
         pop     r11
         pop     r10
         pop     r9
@@ -215,5 +312,47 @@ ramp_step:
         pop     r5
         pop     r4
         pop     r3
+        pop     r2
+        rjmp    shift
+
+negate_one:
+        neg     r20
+        com     r21
+        ret
+
+/* t2 += 1 or -1 */
+step_t2:
+        add     r10, r20
+        adc     r11, r21
+        adc     r12, r21
+        adc     r13, r21
+        adc     r14, r21
+        adc     r15, r21
+        adc     r16, r21
+        adc     r17, r21
+        ret
+
+/* t2 += q, or -= when slowing */
+move_t2:
+        ldd     r18, Z + RAMP_FASTER
+        tst     r18
+        breq    8f
+        add     r10, r22
+        adc     r11, r23
+        adc     r12, r24
+        adc     r13, r25
+        adc     r14, r26
+        adc     r15, r26
+        adc     r16, r26
+        adc     r17, r26
+        ret
+8:      sub     r10, r22
+        sbc     r11, r23
+        sbc     r12, r24
+        sbc     r13, r25
+        sbc     r14, r26
+        sbc     r15, r26
+        sbc     r16, r26
+        sbc     r17, r26
         ret
         .size ramp_step, . - ramp_step
