@@ -64,6 +64,7 @@ static uint8_t last_run_offset;
 static int32_t emitted; /* position, in pulses, when all that is in the ring has been played */
 static uint8_t ended;
 static uint8_t faults;
+static uint32_t certain_centi; /* steepest linear ramp whose first interval is longer than AHEAD_LONG_TICKS */
 static bool gap_on = true;
 static uint32_t v_in_play;
 static uint32_t in_play_cycle_us; /* 0: follows from v_in_play */
@@ -100,6 +101,7 @@ void engine_init(void)
 {
     profile_basis(&basis, settings.steps_per_rev, settings.ustep, settings.slow_rpm);
     v_in_play = basis.v_slow;
+    certain_centi = (130000000u >> basis.factor_log2) / basis.steps_per_rev;
     step_port_init();
 }
 
@@ -631,20 +633,26 @@ static uint16_t certain_ticks(void)
         return command.flags & MOTION_CYCLE && command.velocity >> basis.factor_log2 >= AHEAD_SHORT_TICKS / 8
                    ? AHEAD_SHORT_TICKS
                    : 0;
-    uint32_t v_target = profile_rpm(&basis, &command) * 100u << basis.factor_log2;
+    if (basis.slow_ticks < AHEAD_TICKS + SHORTEST_PIECE_TICKS)
+        return 0;
+    uint16_t least_rpm;
+    uint16_t ahead = AHEAD_TICKS;
     uint32_t accel = accel_centi(command.accel);
-    if (basis.slow_ticks < AHEAD_TICKS + SHORTEST_PIECE_TICKS || v_target <= basis.v_slow)
-        return 0;
-    bool certain;
-    if (!(command.flags & MOTION_LINEAR)) /* at least one step at slow speed */
-        certain = (v_target - basis.v_slow) >> basis.factor_log2 >= accel;
-    else /* c0 = sqrt(3.217e17 / (sprf * F * centi)) ticks; at least one step from 100 RPM on with 200 steps and more */
-        certain = basis.steps_per_rev >= 200 && v_target >> basis.factor_log2 >= 10000u &&
-                  command.accel == command.decel &&
-                  accel <= (130000000u >> basis.factor_log2) / basis.steps_per_rev;
-    if (!certain)
-        return 0;
-    return basis.slow_ticks > AHEAD_LONG_TICKS || command.flags & MOTION_LINEAR ? AHEAD_LONG_TICKS : AHEAD_TICKS;
+    if (!(command.flags & MOTION_LINEAR)) {
+        /* At least one step of acceleration, at slow speed. */
+        least_rpm = (uint16_t)(settings.slow_rpm + 2u + (uint16_t)(accel >> 6));
+        if (basis.slow_ticks >= AHEAD_LONG_TICKS + SHORTEST_PIECE_TICKS)
+            ahead = AHEAD_LONG_TICKS;
+    } else {
+        /* c0 = sqrt(3.217e17 / (sprf * F * centi)) ticks is long enough; at least one step from 100 RPM on with 200 steps
+         * and more, and no less of acceleration than of deceleration in a truncated profile. */
+        least_rpm = basis.steps_per_rev >= 200 && accel <= certain_centi && command.accel <= command.decel ? 100 : 65535;
+        ahead = AHEAD_LONG_TICKS;
+    }
+    uint32_t velocity = command.velocity;
+    bool fast = command.flags & MOTION_CYCLE ? velocity < 65536u && velocity * least_rpm <= basis.us_rpm
+                                             : velocity >= least_rpm;
+    return fast ? ahead : 0;
 }
 
 /* Starts the command, which is not planned yet, from standstill. */
