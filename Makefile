@@ -89,7 +89,7 @@ test_property_planner_SRCS := $(ENGINE_SRCS) test/host/motion_exact.c
 AVR_TESTS := test_number test_line test_session test_wide test_ramp test_profile
 
 # Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
-IMAGE_TESTS := test_image_motion test_image_queue test_image_terminal test_image_stop
+IMAGE_TESTS := test_image_motion test_image_queue test_image_terminal test_image_stop test_image_timing test_image_stress
 # What every whole-image test is linked with.
 IMAGE_COMMON_SRCS := test/image/image.c test/image/model.c
 
@@ -301,6 +301,11 @@ test-board: ## the simulated board against the datasheet
 .PHONY: test-image
 test-image: ## the whole image on the simulated board
 	@$(call build_then_run,$(IMAGE_PARTS),test-image) $(call test_runs,$(IMAGE_BINS))
+
+.PHONY: test-long
+test-long: ## ten million mixed steps with the terminal busy (some minutes); `make test` makes a million
+	@$(MAKE) -s --no-print-directory $(BUILD)/image/test_image_stress $(BUILD)/sac.hex
+	@SAC_STEPS=10000000 $(BUILD)/image/test_image_stress
 
 .PHONY: test-scripts
 test-scripts: ## the simulator program as its user sees it, and the scripts that check the build
