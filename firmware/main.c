@@ -13,8 +13,8 @@ int main(void)
 {
     pins_init();
     engine_init();
-    queue_init();
     commands_init();
+    queue_init();
     terminal_port_init(settings.hw_baud);
     terminal_init();
     atomic_enable();

@@ -19,14 +19,13 @@ typedef struct {
  * one needs 8 samples. baud: >= 1. */
 static inline baud_divisor_t baud_divisor(uint32_t baud)
 {
-    const uint32_t eighths = ((uint32_t)BOARD_CPU_HZ / 8 + baud / 2) / baud;
-    if (eighths == 0) {
-        return (baud_divisor_t){.ubrr = 0, .u2x = true};
+    uint32_t quotient = ((uint32_t)BOARD_CPU_HZ / 8 + baud / 2) / baud;
+    uint16_t eighths = quotient > 8192 ? 8192 : quotient == 0 ? 1 : (uint16_t)quotient;
+    const bool u2x = (eighths & 1) != 0 && eighths <= 4096;
+    if (!u2x) {
+        eighths /= 2;
     }
-    if ((eighths & 1) != 0 && eighths <= 4096) {
-        return (baud_divisor_t){.ubrr = (uint16_t)(eighths - 1), .u2x = true};
-    }
-    return (baud_divisor_t){.ubrr = eighths > 8192 ? 4095 : (uint16_t)(eighths / 2 - 1), .u2x = false};
+    return (baud_divisor_t){.ubrr = (uint16_t)(eighths - 1), .u2x = u2x};
 }
 
 #endif

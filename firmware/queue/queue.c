@@ -1,38 +1,37 @@
 #include "queue/queue.h"
 #include "motion/engine.h"
+#include "queue/session.h"
 #include "settings.h"
 
 static motion_command_t entries[QUEUE_POSITIONS];
 static uint8_t next_available; /* 1..30 */
-static uint8_t next_to_submit; /* 1..30; with nothing pending the same as next_available */
-static uint8_t pending;        /* 0..30 */
+static uint8_t pending;        /* 0..30: the entries before it */
 static uint8_t submitted;      /* commands given to the engine since boot, modulo 256 */
 
-static uint8_t position_after(uint8_t position)
+/* So many entries before the next available one, at most 60. */
+static uint8_t position_before(uint8_t entries_back)
 {
-    return position == QUEUE_LAST ? QUEUE_FIRST : (uint8_t)(position + 1);
+    uint8_t position = (uint8_t)(next_available + 2 * QUEUE_LAST - entries_back);
+    while (position > QUEUE_LAST) {
+        position = (uint8_t)(position - QUEUE_LAST);
+    }
+    return position;
 }
 
 void queue_init(void)
 {
-    motion_command_t seed = {
-        .count = settings.steps_per_rev,
-        .velocity = settings.cycle_us,
-        .accel = settings.accel[settings.ramp],
-        .decel = settings.decel[settings.ramp],
-        .flags = MOTION_CYCLE,
-    };
-    if (settings.ramp != 0) {
-        seed.flags |= MOTION_LINEAR; /* the ramp values are rad/s^2 then */
-    }
+    motion_command_t *seed = &entries[0];
+    session_template(&session, seed);
+    seed->count = settings.steps_per_rev;
+    seed->flags &= (uint8_t)~MOTION_PULSES;
     if (settings.direction != 0) {
-        seed.flags |= MOTION_CCW;
+        seed->flags |= MOTION_CCW;
     }
-    for (uint8_t position = 0; position < QUEUE_POSITIONS; position++) {
-        entries[position] = seed;
+    uint8_t *bytes = (uint8_t *)entries;
+    for (uint16_t i = 0; i < sizeof entries - sizeof *seed; i++) {
+        bytes[i + sizeof *seed] = bytes[i]; /* each entry from the one before it */
     }
     next_available = QUEUE_FIRST;
-    next_to_submit = QUEUE_FIRST;
     pending = 0;
     submitted = engine_commands_ended();
 }
@@ -43,7 +42,7 @@ status_t queue_add(const motion_command_t *command)
         return STATUS_QUEUE_FULL;
     }
     entries[next_available] = *command;
-    next_available = position_after(next_available);
+    next_available = next_available == QUEUE_LAST ? QUEUE_FIRST : (uint8_t)(next_available + 1);
     pending++;
     return STATUS_OK;
 }
@@ -53,29 +52,22 @@ bool queue_poll(void)
     if (pending == 0 || !engine_can_accept()) {
         return false;
     }
-    engine_submit(&entries[next_to_submit]);
-    next_to_submit = position_after(next_to_submit);
+    engine_submit(&entries[position_before(pending)]);
     pending--;
     submitted++;
     return true;
 }
 
-static void drop_pending(void)
-{
-    pending = 0;
-    next_to_submit = next_available;
-}
-
 void queue_stop(void)
 {
-    drop_pending();
+    pending = 0;
     engine_stop();
     submitted = engine_commands_ended();
 }
 
 void queue_stop_graceful(accel_code_t decel, bool linear)
 {
-    drop_pending();
+    pending = 0;
     engine_stop_graceful(decel, linear);
     submitted = engine_commands_ended();
 }
@@ -107,8 +99,7 @@ uint8_t queue_executing_position(void)
     if (not_ended == 0 || not_ended > QUEUE_LAST) {
         return 0;
     }
-    return next_to_submit > not_ended ? (uint8_t)(next_to_submit - not_ended)
-                                      : (uint8_t)(next_to_submit + QUEUE_LAST - not_ended);
+    return position_before((uint8_t)(pending + not_ended));
 }
 
 const motion_command_t *queue_entry(uint8_t position)

@@ -23,7 +23,7 @@ enum {
     QUEUE_POSITIONS = 32,
 };
 
-/* Seeds every entry with the system defaults; nothing is pending. */
+/* Seeds every entry with the system defaults, as session_init() has left them; nothing is pending. */
 void queue_init(void);
 
 /* Stores a command that engine_check() passed at the next available position and makes it pending. */

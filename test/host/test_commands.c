@@ -13,8 +13,8 @@ void setUp(void)
 {
     terminal_port_fake_reset();
     engine_fake_reset();
-    queue_init();
     commands_init();
+    queue_init();
     display_init();
     timebase_fake_running = false;
 }

@@ -1,5 +1,6 @@
 /* queue/queue: 30 entries in a circle, executed in order. */
 #include "queue/queue.h"
+#include "queue/session.h"
 #include "host/fakes/engine_fake.h"
 #include "host/fakes/terminal_port_fake.h"
 #include "settings.h"
@@ -12,6 +13,7 @@ void setUp(void)
     factory = settings;
     terminal_port_fake_reset();
     engine_fake_reset();
+    session_init();
     queue_init();
 }
 
@@ -37,6 +39,7 @@ static void test_entries_are_seeded_with_the_system_defaults(void)
     settings.direction = 1;
     settings.steps_per_rev = 400;
     settings.cycle_us = 1234;
+    session_init();
     queue_init();
     for (uint8_t position = 0; position < QUEUE_POSITIONS; position++) {
         const motion_command_t *entry = queue_entry(position);
@@ -51,6 +54,7 @@ static void test_entries_are_seeded_with_the_system_defaults(void)
 static void test_seeds_of_a_linear_start_up_ramp_carry_its_values_and_its_flag(void)
 {
     settings.ramp = 1;
+    session_init();
     queue_init();
     TEST_ASSERT_EQUAL_UINT16(1047, queue_entry(1)->accel);
     TEST_ASSERT_EQUAL_HEX8(MOTION_CYCLE | MOTION_LINEAR, queue_entry(1)->flags);

@@ -23,8 +23,8 @@ void setUp(void)
 {
     terminal_port_fake_reset();
     engine_fake_reset();
-    queue_init();
     commands_init();
+    queue_init();
     timebase_fake_us = 0;
     timebase_fake_step_us = 0;
     terminal_init();
