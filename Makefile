@@ -69,7 +69,7 @@ test_number_SRCS := firmware/base/number.c
 test_status_SRCS := firmware/base/status.c
 test_line_SRCS := firmware/cli/line.c
 test_session_SRCS := firmware/queue/session.c firmware/settings.c
-test_queue_SRCS := firmware/queue/queue.c firmware/settings.c $(FAKE_SRCS)
+test_queue_SRCS := firmware/queue/queue.c firmware/queue/session.c firmware/settings.c $(FAKE_SRCS)
 test_motion_syntax_SRCS := firmware/cli/motion_syntax.c firmware/base/number.c firmware/queue/session.c \
     firmware/settings.c $(FAKE_SRCS)
 test_commands_SRCS := $(CLI_SRCS)
