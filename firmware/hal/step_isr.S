@@ -76,25 +76,38 @@ low_byte_over:
         rjmp    return
 
 segment_over:
+        lds     r24, step_flags
+        andi    r24, SEGMENT_EARLY_MASK
+        brne    early
         push    r30
         push    r31
         lds     r30, step_tail
         ldi     r31, hi8(segments)
         lds     r24, step_head
         cp      r24, r30
-        brne    1f
+        breq    1f
+        rjmp    load
+1:      ldi     r24, 0
         rjmp    ring_empty
-1:
-        lds     r24, step_flags
-        andi    r24, SEGMENT_EARLY_MASK
+
+        /* Too short a period to reload in: the count ended early, and the periods still due are waited for here. The
+         * first wait comes before anything else, so that a late interrupt misses none. */
+early:
+        sbis    io(TIFR1), TOV1
+        rjmp    early
+        sbi     io(TIFR1), TOV1         /* clears the flag, and only this one (datasheet 14.4.3) */
+        push    r30
+        push    r31
+        lds     r30, step_tail
+        lds     r31, step_head
+        cp      r31, r30
+        brne    2f
+        rjmp    early_empty
+2:      ldi     r31, hi8(segments)
+        cpi     r24, 1 << SEGMENT_EARLY_SHIFT
         brne    2f
         rjmp    load
-        /* Too short a period to reload in: the count ended early, and the periods still due are waited for here. */
-2:      sbis    io(TIFR1), TOV1
-        rjmp    2b
-        sbi     io(TIFR1), TOV1         /* clears the flag, and only this one (datasheet 14.4.3) */
-        cpi     r24, 1 << SEGMENT_EARLY_SHIFT
-        breq    load
+2:
         /* What would be too long for the last period is done before it. T = two more waits, not one. */
         bst     r24, SEGMENT_EARLY_SHIFT
         account
@@ -149,25 +162,24 @@ set_dir:
         cbi     io(PORTB), 5
         ret
 
-ring_empty:
-        ldi     r31, 0
-        out     io(GPIOR1), r31
-        lds     r30, step_flags
-        mov     r24, r30
+early_empty:
+        lsr     r24
+        lsr     r24
+        lsr     r24
+        dec     r24                     /* one has been waited for */
+ring_empty:                             /* r24: periods of the segment that are still due */
+        mov     r31, r24
+        lds     r24, step_flags
         sbrc    r24, SEGMENT_SET_DIR_BIT
         rcall   set_dir
         andi    r24, ~(SEGMENT_EARLY_MASK | (1 << SEGMENT_SET_DIR_BIT))
         sts     step_flags, r24
-        /* Periods of an early-ended segment that are still due are counted as usual. */
-        mov     r24, r30
-        andi    r24, SEGMENT_EARLY_MASK
-        lsr     r24
-        lsr     r24
-        lsr     r24
-        out     io(GPIOR0), r24
-        tst     r24
+        ldi     r30, 0
+        out     io(GPIOR1), r30
+        out     io(GPIOR0), r31
+        tst     r31
         breq    1f
-        rjmp    leave
+        rjmp    leave                   /* they are counted as usual */
 1:
         /* Planned motion is not over but the planner is behind: repeat the interval, so that no pulse is lost. */
         lds     r24, step_hold
@@ -184,8 +196,8 @@ run_out:
         ldi     r24, hi8(SEGMENT_SILENT)
         sts     OCR1BH, r24
         sts     OCR1BL, r24
-        sts     motion_state, r31
-        sts     TIMSK1, r31             /* from here on nobody counts: the main loop stops the timer */
+        sts     motion_state, r30
+        sts     TIMSK1, r30             /* from here on nobody counts: the main loop stops the timer */
         ldi     r24, 1
         sts     step_idle, r24
         rjmp    leave

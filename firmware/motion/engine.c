@@ -23,7 +23,6 @@
 #define START_TICKS 8000u        /* in the ring before the timer runs */
 #define RING_RESERVE 4u          /* segments that one step of emission may need */
 #define STEADY_MOST_GROUPS 12u /* emitted in the short way at a time (ramp.c) */
-#define STEADY_LEAST_Q8 (UNSPLIT_BELOW_TICKS * 256ul) /* of groups too small for an early reload */
 #define UNSPLIT_BELOW_TICKS 128u
 
 /* What comes next of the command being emitted. */
@@ -49,6 +48,7 @@ static motion_state_t ramp_state; /* the phase that `ramp` was begun for; MOTION
 static uint32_t silence_chunks;  /* still to be emitted before ... */
 static uint16_t piece_ticks;     /* ... this period; 0: none */
 static bool piece_pulse;
+static uint16_t owed;            /* held pulses still to be left out */
 static int32_t carry_q8;         /* 1/256 ticks rounded off so far */
 static uint16_t ahead_ticks;     /* part of the next interval that has been emitted as silence */
 static bool dir_due;             /* the next single period sets the dir pin */
@@ -218,30 +218,32 @@ static void push(uint16_t periods, uint16_t top, bool pulse, motion_state_t stat
     uint8_t flags = (uint8_t)(state | direction_flags(&command, turn));
     dir_due = dir_due && !turn;
     look_for_end();
-    while (pulse && step_held) {
-        uint16_t too_many = absorb_held();
-        if (too_many >= periods)
-            return;
-        periods = (uint16_t)(periods - too_many);
-    }
-    if (pulse)
+    if (pulse) {
+        if (step_held)
+            owed = (uint16_t)(owed + absorb_held());
+        uint16_t given = owed < periods ? owed : periods;
+        owed = (uint16_t)(owed - given);
+        periods = (uint16_t)(periods - given);
         add_pulses(flags, periods);
+    }
     uint8_t early = early_flags(top);
+    uint16_t counted = periods;
     if (periods > early_periods(early)) {
         flags |= early;
-        periods = (uint16_t)(periods - early_periods(early));
+        counted = (uint16_t)(periods - early_periods(early));
     } else if (early) {
         top = SEGMENT_EARLY1_BELOW_TICKS - 1;
     }
     s->top = top;
     s->match = pulse ? (uint16_t)(top - pulse_width_ticks()) : SEGMENT_SILENT;
-    s->count_low = (uint8_t)periods;
-    s->count_high = (uint8_t)((uint16_t)(periods - 1) >> 8);
+    s->count_low = (uint8_t)counted;
+    s->count_high = (uint8_t)((uint16_t)(counted - 1) >> 8);
     s->flags = flags;
     uint8_t hold = pulse ? pulses_to_come() : 0;
     uint8_t lock = step_port_lock();
     step_hold = hold > step_held ? (uint8_t)(hold - step_held) : 0; /* those held meanwhile will be given back */
-    step_head = (uint8_t)(step_head + SEGMENT_BYTES);
+    if (periods)
+        step_head = (uint8_t)(step_head + SEGMENT_BYTES);
     step_port_unlock(lock);
 }
 
@@ -417,7 +419,7 @@ static void emit_ramp(uint32_t *left, uint32_t at_most, motion_state_t state, bo
     begin_ramp(state);
     /* Enough left that held pulses can be given back, and periods that need no early reload. */
     if (ramp.steady && at_most >= 2u * ramp.group && profile_pulses_left() > STEADY_MOST_GROUPS * ramp.group && !step_held &&
-        !tail_awaited && !dir_due && carry_q8 >= 0 && (ramp.group >= 4 || ramp.u.harmonic.q8 > STEADY_LEAST_Q8)) {
+        !tail_awaited && !dir_due && !owed && carry_q8 >= 0) {
         emit_steady(left, at_most, faster, state);
         return;
     }
@@ -601,6 +603,7 @@ static void begin_ring(void)
     step_hold = 0;
     step_held = 0;
     step_idle = 0;
+    owed = 0;
     carry_q8 = 0;
     ahead_ticks = 0;
     silence_chunks = 0;
