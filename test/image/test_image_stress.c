@@ -136,7 +136,7 @@ static void test_500_random_commands_keep_count_bounds_and_sum(void)
             if (!bad && faulty)
                 snprintf(what, sizeof what, "expected no fault, saw \"%.50s\"", shown);
             if (bad || faulty) {
-                if (wrong++ < 12)
+                if (wrong++ < 40)
                     printf("microsteps %u, %s: %s\n", 1u << machine.ustep, line, what);
                 if (first[0] == '\0')
                     snprintf(first, sizeof first, "microsteps %u, %s: %s", 1u << machine.ustep, line, what);
