@@ -74,13 +74,32 @@ static void submit(motion_command_t c)
     engine_submit(&c);
 }
 
+/* One round of the main loop. The engine may say for ever that it is at work while it waits for the moment to join a
+ * command: some time passes then. False if it had nothing to do. */
+static bool poll(void)
+{
+    static unsigned rounds;
+    if (!engine_poll()) {
+        rounds = 0;
+        return false;
+    }
+    step_player_advance(planner_ticks);
+    if (++rounds % 64 == 0) {
+        if ((uint8_t)(step_head - step_tail) > 2 * SEGMENT_BYTES)
+            step_player_to_next_load();
+        else
+            step_player_advance(2000);
+    }
+    return true;
+}
+
 /* The main loop for a while: polls, and lets time pass when there is nothing to do. */
 static void run_until(uint64_t time)
 {
     while (step_player_now() < time) {
-        if (engine_poll()) {
-            step_player_advance(planner_ticks);
-        } else if (step_player_stopped()) {
+        if (poll())
+            continue;
+        if (step_player_stopped()) {
             step_player_advance_to(time);
         } else {
             uint64_t before = step_player_now();
@@ -98,9 +117,7 @@ static void run_for(uint64_t ticks)
 static void run_to_end(void)
 {
     for (;;) {
-        if (engine_poll())
-            step_player_advance(planner_ticks);
-        else if (!step_player_to_next_load())
+        if (!poll() && !step_player_to_next_load())
             break;
     }
 }
@@ -121,9 +138,7 @@ static void run_all(const motion_command_t *commands, size_t count)
     for (;;) {
         if (next < count && engine_can_accept())
             submit(commands[next++]);
-        if (engine_poll())
-            step_player_advance(planner_ticks);
-        else if (!step_player_to_next_load() && next == count)
+        if (!poll() && !step_player_to_next_load() && next == count)
             break;
     }
 }
