@@ -208,3 +208,22 @@ wide_shift:                     /* r24 x, r22 bits */
         adiw    r30, 8
         rjmp    1b
 3:      ret
+
+        .section .text.wide_bits, "ax", @progbits
+        .global wide_bits
+        .type wide_bits, @function
+wide_bits:                      /* r24 x */
+        movw    r30, r24
+        adiw    r30, 8
+        ldi     r24, 64
+1:      ld      r18, -Z
+        tst     r18
+        brne    2f
+        subi    r24, 8
+        brne    1b
+        ret
+2:      lsl     r18
+        brcs    3f
+        dec     r24
+        rjmp    2b
+3:      ret

@@ -15,6 +15,7 @@ void wide_subtract(wide_t *difference, const wide_t *x); /* difference -= x */
 void wide_multiply(wide_t *product, const wide_t *x, const wide_t *y); /* product = x * y, another object than x, y */
 uint32_t wide_divide(wide_t *x, uint32_t divisor); /* x /= divisor, truncated; returns the remainder. divisor >= 1 */
 uint32_t wide_root(const wide_t *x);               /* sqrt(x), truncated */
+uint8_t wide_bits(const wide_t *x);                /* of x without its leading zeros: 0..64 */
 void wide_shift(wide_t *x, uint8_t bits);          /* x >>= bits, without sign; bits < 64 */
 #else
 static inline void wide_add(wide_t *sum, const wide_t *x)
@@ -48,6 +49,13 @@ static inline uint32_t wide_root(const wide_t *x)
         }
     }
     return (uint32_t)root;
+}
+static inline uint8_t wide_bits(const wide_t *x)
+{
+    uint8_t bits = 0;
+    for (uint64_t rest = *x; rest; rest >>= 1)
+        bits++;
+    return bits;
 }
 static inline void wide_shift(wide_t *x, uint8_t bits)
 {

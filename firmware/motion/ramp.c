@@ -3,7 +3,9 @@
  * a few additions put it right (ramp_step). Where a ramp begins, and near a standstill, the value is computed from
  * scratch; the remainder is exact there too. When the group size doubles or halves, value, slope and curve do too. */
 #include "motion/ramp.h"
+#include "base/inline.h"
 #include "base/wide.h"
+#include <string.h>
 
 /* Shortest group worth planning: the planner's cost per group plus the interrupt's, in cycles = ticks. */
 #define GROUP_MIN_TICKS 600u
@@ -48,8 +50,7 @@ static void divide_k(wide_t *quotient, const ramp_constants_t *constants, uint32
 
 static uint32_t low_limited(const wide_t *x)
 {
-    uint32_t low = wide_half(x, 0);
-    return wide_half(x, 1) || low > LONGEST_Q8 ? LONGEST_Q8 : low;
+    return wide_bits(x) > 31 ? LONGEST_Q8 : wide_half(x, 0);
 }
 
 ramp_time_t ramp_interval(const ramp_constants_t *constants, uint32_t v)
@@ -69,7 +70,7 @@ uint32_t ramp_velocity(const ramp_constants_t *constants, uint32_t ticks)
     return ((uint32_t)wide_from_byte(&v512, 1) + 1) >> 1;
 }
 
-static uint32_t magnitude(int32_t x)
+NOINLINE static uint32_t magnitude(int32_t x)
 {
     return x < 0 ? 0u - (uint32_t)x : (uint32_t)x;
 }
@@ -157,58 +158,69 @@ uint32_t ramp_step(ramp_t *ramp)
 /* -- the size of groups ------------------------------------------------------------------------------------------ */
 
 /* How many pulses to put together, given the interval and the change between the last two groups. */
-static uint16_t choose_group(uint16_t group, uint32_t interval_ticks, uint32_t slope_q8, uint16_t min_ticks)
+static uint8_t choose_group(uint8_t group, uint16_t interval, uint16_t slope_q8, uint16_t min_ticks)
 {
-    uint16_t at_least = 1;
-    if (interval_ticks > GROUP_MAX_TICKS / 2)
+    if (interval > GROUP_MAX_TICKS / 2)
         return 1;
-    uint16_t interval = (uint16_t)interval_ticks;
+    bool may_grow = (uint32_t)interval * group < GROUP_MAX_TICKS / 2;
+    uint8_t at_least = 1;
     if (interval < min_ticks) {
         min_ticks = (uint16_t)(min_ticks + GROUP_MORE_TICKS);
         do {
-            at_least = (uint16_t)(at_least * 2);
+            min_ticks = (uint16_t)(min_ticks + at_least * GROUP_PULSE_TICKS);
+            at_least = (uint8_t)(at_least * 2);
             interval = (uint16_t)(interval * 2);
-            min_ticks = (uint16_t)(min_ticks + at_least / 2 * GROUP_PULSE_TICKS);
         } while (interval < min_ticks && at_least < GROUP_MAX);
     }
     if (group < at_least)
         return at_least;
     /* The intervals of twice the group differ by half a tick. */
-    if (slope_q8 < SLOPE_KEEPS_Q8 / 3 && group < GROUP_MAX && interval_ticks * group < GROUP_MAX_TICKS / 2)
-        return (uint16_t)(group * 2);
+    if (slope_q8 < SLOPE_KEEPS_Q8 / 3 && group < GROUP_MAX && may_grow)
+        return (uint8_t)(group * 2);
     if (slope_q8 > SLOPE_KEEPS_Q8 && group > at_least)
-        return (uint16_t)(group / 2);
+        return group / 2;
     return group;
 }
 
 /* Carries value, slope and curve over to groups of twice or half the pulses: the parabola through them stays. */
 static void resize(ramp_t *ramp, bool twice)
 {
-    int32_t q = (int32_t)ramp->u.harmonic.q8; /* of one interval, or of a group */
+    bool linear = ramp->linear; /* the value is of a group, not of one interval */
+    int32_t q = (int32_t)ramp->u.harmonic.q8;
     int32_t slope = ramp->u.harmonic.slope;
     int32_t curve = ramp->u.harmonic.curve;
     if (twice) {
-        q -= slope / 2;
-        slope = 2 * (slope - curve);
-        curve *= 4;
-        if (ramp->linear) {
+        if (linear) {
             q *= 2;
             slope *= 2;
             curve *= 2;
         }
+        q -= slope >> 1;
+        slope = (slope - curve) * 2;
+        curve *= 4;
     } else {
-        if (ramp->linear) {
-            q /= 2;
-            slope /= 2;
-            curve /= 2;
+        curve >>= 2;
+        slope = (slope >> 1) + curve;
+        q += slope >> 1;
+        if (linear) {
+            q >>= 1;
+            slope >>= 1;
+            curve >>= 1;
         }
-        curve /= 4;
-        slope = slope / 2 + curve;
-        q += slope / 2;
     }
     ramp->u.harmonic.q8 = (uint32_t)q;
     ramp->u.harmonic.slope = slope;
     ramp->u.harmonic.curve = curve;
+}
+
+/* A new ramp: all 0 but this. */
+static void begin(ramp_t *ramp, bool linear, bool faster)
+{
+    memset(ramp, 0, sizeof *ramp);
+    ramp->linear = linear;
+    ramp->faster = faster;
+    ramp->group = 1;
+    ramp->group_limit = 1;
 }
 
 /* -- harmonic ---------------------------------------------------------------------------------------------------- */
@@ -216,13 +228,7 @@ static void resize(ramp_t *ramp, bool twice)
 void ramp_begin_harmonic(ramp_t *ramp, const ramp_constants_t *constants, uint32_t v_first, uint32_t step, bool faster,
                          uint32_t v_cap)
 {
-    ramp->linear = false;
-    ramp->steady = 0;
-    ramp->faster = faster;
-    ramp->seen = 0;
-    ramp->group = 1;
-    ramp->group_log2 = 0;
-    ramp->group_limit = 1;
+    begin(ramp, false, faster);
     ramp->u.harmonic.next2 = 2 * v_first;
     ramp->u.harmonic.cap2 = 2 * v_cap;
     ramp->u.harmonic.step = step;
@@ -235,9 +241,9 @@ void ramp_begin_harmonic(ramp_t *ramp, const ramp_constants_t *constants, uint32
 /* What the sum over a group of k pulses exceeds k times the interval q in its middle by, where s is the law's change
  * over k pulses there: k q (s2 + s4), a power series in r = s / q:
  * s2 = (1 - 1 / k^2) / 12 r^2, s4 = (1 - 1 / k^2) (3 - 7 / k^2) / 240 r^4. */
-static uint32_t excess(uint32_t q, uint32_t s, uint16_t k)
+static uint32_t excess(uint32_t q, uint32_t s, uint8_t k)
 {
-    uint32_t k2 = (uint32_t)k * k;
+    uint16_t k2 = (uint16_t)(k * k);
     uint32_t square = ramp_scale(s, s, q);
     if (square > q >> 10) {
         uint32_t fourth = ramp_scale(square, square, q);
@@ -255,16 +261,18 @@ void ramp_linear_c(wide_t *c_q8, uint16_t steps_per_rev, uint8_t factor_log2, ui
     *c_q8 = 10294370808072384000u;
     wide_divide(c_q8, steps_per_rev);
     wide_divide(c_q8, accel_centi);
-    wide_add(c_q8, c_q8);
-    wide_add(c_q8, c_q8);
-    wide_add(c_q8, c_q8);
+    for (uint8_t i = 0; i < 3; i++)
+        wide_add(c_q8, c_q8);
     wide_shift(c_q8, factor_log2);
 }
 
-/* Does x, without sign, take 31 bits at most? */
-static bool is_small(const wide_t *x)
+/* sum +- x */
+static void add_if(wide_t *sum, const wide_t *x, bool add)
 {
-    return wide_half(x, 1) == 0 && wide_half(x, 0) <= INT32_MAX;
+    if (add)
+        wide_add(sum, x);
+    else
+        wide_subtract(sum, x);
 }
 
 void ramp_linear_time(wide_t *t_q4, const wide_t *c_q8, uint32_t n, wide_t *rest)
@@ -272,12 +280,10 @@ void ramp_linear_time(wide_t *t_q4, const wide_t *c_q8, uint32_t n, wide_t *rest
     wide_t wide_n = n;
     wide_t x = *c_q8;
     wide_t y;
-    uint32_t most = UINT32_MAX / n;
-    uint8_t halved = 0;
-    while (wide_half(&x, 1) >= most) { /* the root of n * C / 4^halved, which fits 64 bits */
-        wide_shift(&x, 2);
-        halved++;
-    }
+    /* The root of n * C / 4^halved, which fits 64 bits. */
+    uint8_t bits = (uint8_t)(wide_bits(&x) + wide_bits(&wide_n));
+    uint8_t halved = bits > 64 ? (uint8_t)(bits - 63) / 2 : 0;
+    wide_shift(&x, (uint8_t)(2 * halved));
     wide_multiply(&y, &x, &wide_n);
     *t_q4 = wide_root(&y);
     for (uint8_t i = halved; i; i--)
@@ -289,24 +295,18 @@ void ramp_linear_time(wide_t *t_q4, const wide_t *c_q8, uint32_t n, wide_t *rest
         if (halved == 0)
             return;
         /* What was lost by halving: t += rest / 2t. */
-        bool negative = wide_half(rest, 1) > INT32_MAX;
+        bool more = wide_half(rest, 1) <= INT32_MAX;
         x = 0;
-        if (negative)
-            wide_subtract(&x, rest);
-        else
-            wide_add(&x, rest);
+        add_if(&x, rest, more);
         y = *t_q4;
         wide_add(&y, &y);
-        while (!is_small(&x) || !is_small(&y)) {
-            wide_shift(&x, 1);
-            wide_shift(&y, 1);
-        }
-        x = (uint32_t)x / (uint32_t)y;
-        if (negative)
-            wide_subtract(t_q4, &x);
-        else
-            wide_add(t_q4, &x);
-        if (wide_half(&x, 0) == 0)
+        bits = wide_bits(&x) > wide_bits(&y) ? wide_bits(&x) : wide_bits(&y);
+        bits = bits > 32 ? (uint8_t)(bits - 32) : 0;
+        wide_shift(&x, bits);
+        wide_shift(&y, bits);
+        wide_divide(&x, (uint32_t)y);
+        add_if(t_q4, &x, more);
+        if (wide_bits(&x) == 0)
             return;
     }
 }
@@ -316,31 +316,26 @@ static uint32_t estimate(const ramp_t *ramp)
 {
     wide_t t = ramp->u.linear.t2_q4;
     wide_t c = ramp->u.linear.c_q8;
-    if (wide_half(&t, 1) > 127) {
+    uint8_t bits = wide_bits(&t);
+    if (bits >= 40) {
         /* Far from standstill: C / 2t; here the group's C may not fit. */
-        while (wide_half(&t, 1)) {
-            wide_shift(&t, 1);
-            wide_shift(&c, 1);
-        }
+        bits = (uint8_t)(bits - 32);
+        wide_shift(&t, bits);
+        wide_shift(&c, bits);
         wide_divide(&c, (uint32_t)t);
         return (uint32_t)c * ramp->group;
     }
     c = ramp->u.linear.group_c;
     wide_add(&c, &ramp->u.linear.rest);
-    wide_shift(&t, 1);
-    uint8_t halved = 0;
-    while (!is_small(&t) || wide_half(&c, 1) >> 30) {
-        wide_shift(&t, 1);
-        wide_shift(&c, 2);
+    uint8_t halved = bits > 32 ? (uint8_t)(bits - 32) : 0;
+    if (wide_bits(&c) > 62)
         halved++;
-    }
+    wide_shift(&t, (uint8_t)(halved + 1));
+    wide_shift(&c, (uint8_t)(2 * halved));
     wide_t square;
     wide_multiply(&square, &t, &t);
-    if (ramp->faster)
-        wide_add(&square, &c);
-    else
-        wide_subtract(&square, &c);
-    if (wide_half(&square, 1) > INT32_MAX)
+    add_if(&square, &c, ramp->faster);
+    if (wide_bits(&square) > 63)
         square = 0; /* the last group: to standstill exactly */
     return magnitude((int32_t)(wide_root(&square) - (uint32_t)t)) << halved;
 }
@@ -348,27 +343,14 @@ static uint32_t estimate(const ramp_t *ramp)
 void ramp_begin_linear(ramp_t *ramp, const wide_t *c_q8, const wide_t *t_q4, const wide_t *rest, bool faster,
                        uint32_t max_ticks)
 {
-    ramp->linear = true;
-    ramp->steady = 0;
-    ramp->faster = faster;
-    ramp->seen = 0;
-    ramp->group = 1;
-    ramp->group_log2 = 0;
-    ramp->group_limit = 1;
-    ramp->bound_q8 = max_ticks << 8;
-    ramp->bound_q16 = 0;
-    ramp->bound_carry = 0;
-    ramp->u.linear.t2_q4 = *t_q4;
+    begin(ramp, true, faster);
     wide_add(&ramp->u.linear.t2_q4, t_q4);
-    ramp->u.linear.c_q8 = *c_q8;
-    ramp->u.linear.group_c = *c_q8;
-    ramp->u.linear.rest = 0;
-    if (faster) {
-        ramp->bound_q8 = 0;
-        wide_add(&ramp->u.linear.rest, rest);
-    } else {
-        wide_subtract(&ramp->u.linear.rest, rest);
-    }
+    wide_add(&ramp->u.linear.t2_q4, t_q4);
+    wide_add(&ramp->u.linear.c_q8, c_q8);
+    wide_add(&ramp->u.linear.group_c, c_q8);
+    if (!faster)
+        ramp->bound_q8 = max_ticks << 8;
+    add_if(&ramp->u.linear.rest, rest, faster);
     ramp->u.linear.sum_q4 = estimate(ramp); /* to choose the first group's size */
 }
 
@@ -384,157 +366,197 @@ void ramp_bound(ramp_t *ramp, const ramp_constants_t *constants, uint32_t v)
 
 /* -- both -------------------------------------------------------------------------------------------------------- */
 
-uint16_t ramp_next(ramp_t *ramp, const ramp_constants_t *constants, uint32_t left, ramp_time_t *sum)
+/* Of the last group: mean interval and its change, both 65535 at most. */
+NOINLINE static uint16_t last_ticks(const ramp_t *ramp)
 {
+    uint32_t ticks = ramp->u.harmonic.q8 >> 8;
+    if (ramp->linear)
+        ticks = ramp->u.linear.sum_q4 >> 4 >> ramp->group_log2;
+    return ticks > UINT16_MAX ? UINT16_MAX : (uint16_t)ticks;
+}
+
+static uint16_t last_slope_q8(const ramp_t *ramp)
+{
+    uint32_t slope_q8 = magnitude(ramp->u.harmonic.slope);
+    if (slope_q8 > 0xFFF)
+        return UINT16_MAX;
+    return ramp->linear ? (uint16_t)(slope_q8 << 4) >> ramp->group_log2 : (uint16_t)slope_q8;
+}
+
+/* Sets the group that comes next; false if it can be carried on from the last. */
+static bool begin_group(ramp_t *ramp, uint32_t left)
+{
+    uint8_t wish = ramp->group_limit;
+    uint16_t ticks = last_ticks(ramp);
+    uint16_t slope_q8 = last_slope_q8(ramp);
     bool linear = ramp->linear;
-    uint32_t q = ramp->u.harmonic.q8;
-    int32_t slope = ramp->u.harmonic.slope;
-    uint32_t ticks = q >> 8;
-    uint32_t slope_q8 = magnitude(slope);
-    uint32_t next2 = ramp->u.harmonic.next2;
-    uint32_t step = ramp->u.harmonic.step;
-    uint16_t wish = ramp->group_limit;
-    bool from_scratch; /* too near a standstill to be carried on */
-    uint16_t min_ticks = GROUP_MIN_TICKS;
-    uint16_t full_ticks = GROUP_MIN_TICKS_FULL;
+    uint32_t speed; /* what a group's `change` is to be small against */
+    uint32_t change;
+    bool from_scratch;
+    uint16_t min_ticks;
     if (linear) {
-        next2 = (uint32_t)wide_from_byte(&ramp->u.linear.t2_q4, 2);
-        ticks = q >> 4 >> ramp->group_log2;
-        slope_q8 = slope_q8 < 0x10000u ? slope_q8 << 4 >> ramp->group_log2 : UINT32_MAX;
-        from_scratch = q >> 18 || q >> 10 >= next2; /* long, or less than 16 groups away */
+        speed = (uint32_t)wide_from_byte(&ramp->u.linear.t2_q4, 2);
+        change = ticks >> 7;
+        uint32_t q = ramp->u.linear.sum_q4;
+        from_scratch = q >> 18 || q >> 10 >= speed; /* long, or less than 16 groups from standstill */
         min_ticks = GROUP_MIN_TICKS_LINEAR;
-        full_ticks = GROUP_MIN_TICKS_LINEAR_FULL;
     } else {
+        speed = ramp->u.harmonic.next2 >> 3;
+        change = ramp->u.harmonic.step;
         /* The velocity changes from group to group by more than a 43rd, or a 128th where that is many corrections. */
-        from_scratch = 2 * step * wish > (next2 >> 7) + (ticks < 4096 ? next2 >> 6 : 0);
+        from_scratch = change * wish > (speed >> 5) + (ticks < 4096 ? speed >> 4 : 0);
+        min_ticks = GROUP_MIN_TICKS;
     }
     if (ramp->seen < SEEN_ENOUGH) {
         from_scratch = true;
         if (ramp->seen < 2)
             slope_q8 = SLOPE_KEEPS_Q8; /* not known */
     }
-    wish = choose_group(wish, ticks, slope_q8, from_scratch ? full_ticks : min_ticks);
-    /* Near a standstill accuracy goes before the planner's load: a group may change by a quarter of its velocity. */
-    uint16_t enough = (uint16_t)(2 * wish);
-    while (wish > 1 && from_scratch && (linear ? ticks * wish >> 7 > next2 : step * wish > next2 >> 3))
-        enough = wish /= 2;
-
+    if (from_scratch)
+        min_ticks = linear ? GROUP_MIN_TICKS_LINEAR_FULL : GROUP_MIN_TICKS_FULL;
+    wish = choose_group(wish, ticks, slope_q8, min_ticks);
     /* A power of two while there is enough left; the last group takes what remains. */
-    uint16_t group = left < enough ? (uint16_t)left : wish;
-    bool capped = !linear && next2 > ramp->u.harmonic.cap2;
-    if (capped) {
-        uint32_t over = (next2 - ramp->u.harmonic.cap2 - 1) / (2 * step) + 1;
-        if (group > over)
-            group = (uint16_t)over;
-        from_scratch = true;
+    uint8_t group = left >> 1 < wish ? (uint8_t)left : wish;
+    /* Near a standstill accuracy goes before the planner's load: a group may change by a quarter of its velocity. */
+    while (from_scratch && wish > 1 && change * wish > speed) {
+        wish /= 2;
+        group = left < wish ? (uint8_t)left : wish;
     }
     ramp->group_limit = wish;
-    if (group != ramp->group) {
-        if (ramp->seen == SEEN_ENOUGH && (group == 2 * ramp->group || 2 * group == ramp->group)) {
-            resize(ramp, group > ramp->group);
+    ramp->capped = false;
+    if (!linear && ramp->u.harmonic.next2 > ramp->u.harmonic.cap2) {
+        uint32_t over = (ramp->u.harmonic.next2 - ramp->u.harmonic.cap2 - 1) / change / 2;
+        if (group > over)
+            group = (uint8_t)(over + 1);
+        ramp->capped = true;
+        from_scratch = true;
+    }
+    uint8_t before = ramp->group;
+    if (group != before) {
+        if (ramp->seen == SEEN_ENOUGH && (group == before << 1 || group << 1 == before)) {
+            resize(ramp, group > before);
         } else {
             ramp->seen = 0;
             from_scratch = true;
         }
         ramp->group = group;
         ramp->group_log2 = 0;
-        for (uint16_t g = group; g > 1; g >>= 1)
+        for (uint8_t g = group; g > 1; g >>= 1)
             ramp->group_log2++;
         if (linear) {
             wide_t wide_group = group;
             wide_multiply(&ramp->u.linear.group_c, &wide_group, &ramp->u.linear.c_q8);
         }
-        q = ramp->u.harmonic.q8;
-        slope = ramp->u.harmonic.slope;
     }
+    return from_scratch;
+}
 
+/* After a value from scratch: slope and curve from the ones before. */
+NOINLINE static void follow(ramp_t *ramp, uint32_t q_before, int32_t slope_before)
+{
+    uint32_t slope = ramp->u.harmonic.q8 - q_before;
+    ramp->u.harmonic.slope = (int32_t)slope;
+    ramp->u.harmonic.curve = (int32_t)(slope - (uint32_t)slope_before);
+    if (ramp->seen < SEEN_ENOUGH)
+        ramp->seen++;
+}
+
+static void harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, bool from_scratch, ramp_time_t *sum)
+{
+    uint8_t group = ramp->group;
+    uint32_t step = ramp->u.harmonic.step;
+    uint32_t next2 = ramp->u.harmonic.next2;
+    if (!ramp->faster)
+        step = 0u - step;
     uint32_t spacing2 = 2 * step * group;
-    uint32_t mid2 = 0;
-    if (!linear) {
-        /* Where the group before this one would have had its middle. */
-        uint32_t back2 = step * (uint16_t)(group + 1);
-        if (ramp->faster) {
-            mid2 = next2 - back2;
-        } else {
-            spacing2 = 0u - spacing2;
-            mid2 = next2 + back2;
-        }
-        ramp->u.harmonic.spacing2 = spacing2;
-        ramp->u.harmonic.mid2 = mid2;
-    }
-    if (!from_scratch) {
-        ramp_step(ramp);
-    } else if (linear) {
-        ramp->u.linear.slope = (int32_t)(estimate(ramp) - q);
-        ramp->u.linear.curve = 0;
-        ramp_step(ramp);
-    } else {
+    ramp->u.harmonic.spacing2 = spacing2;
+    /* Where the group before this one would have had its middle. */
+    uint32_t mid2 = next2 - step * (uint16_t)(group + 1);
+    ramp->u.harmonic.mid2 = mid2;
+    uint32_t s;
+    if (from_scratch) {
+        uint32_t q_before = ramp->u.harmonic.q8;
         mid2 += spacing2;
         ramp->u.harmonic.next2 = next2 + spacing2;
+        if (ramp->capped)
+            mid2 = ramp->u.harmonic.cap2;
         wide_t q8;
-        divide_k(&q8, constants, capped ? ramp->u.harmonic.cap2 : mid2);
+        divide_k(&q8, constants, mid2);
         ramp->u.harmonic.q8 = low_limited(&q8);
         if (ramp->u.harmonic.q8 == LONGEST_Q8) {
             /* Half a second and more, only at the start or end of a crawl: one by one. */
             sum->ticks = (uint32_t)wide_from_byte(&q8, 1);
             sum->frac = (uint8_t)q8;
             ramp->seen = 0;
-            return group;
+            return;
         }
         ramp->u.harmonic.mid2 = mid2;
-    }
-    uint32_t new_q = ramp->u.harmonic.q8;
-    if (from_scratch) {
-        int32_t new_slope = (int32_t)(new_q - q);
-        ramp->u.harmonic.slope = new_slope;
-        ramp->u.harmonic.curve = (int32_t)((uint32_t)new_slope - (uint32_t)slope);
-        if (ramp->seen < SEEN_ENOUGH)
-            ramp->seen++;
-        if (capped)
+        follow(ramp, q_before, ramp->u.harmonic.slope);
+        s = 0;
+        if (ramp->capped)
             ramp->seen = 0;
-    }
-    slope_q8 = magnitude(ramp->u.harmonic.slope);
-
-    bool steady = !from_scratch && (group & (group - 1)) == 0;
-    if (linear) {
-        sum->ticks = new_q >> 4;
-        sum->frac = (uint8_t)(new_q << 4);
-        uint32_t bound_q8 = ramp->bound_q8;
-        if (group > 1 && bound_q8 >> 24)
-            bound_q8 = UINT32_MAX;
-        else
-            bound_q8 *= group;
-        uint32_t bound_q4 = bound_q8 >> 4;
-        if (ramp->faster ? new_q < bound_q4 : new_q > bound_q4) {
-            uint16_t carry = (uint16_t)(ramp->bound_carry + group * ramp->bound_q16);
-            ramp->bound_carry = (uint8_t)carry;
-            bound_q8 += carry >> 8;
-            sum->ticks = bound_q8 >> 8;
-            sum->frac = (uint8_t)bound_q8;
-        }
-        /* Far enough from standstill and from the bound that none is reached meanwhile. */
-        if (new_q >> 9 >= next2 ||
-            (ramp->faster ? new_q < bound_q4 + 16 * slope_q8 : new_q + 32 * slope_q8 > bound_q4))
-            steady = false;
-        ticks = new_q >> 4 >> ramp->group_log2;
+        else if (group > 1)
+            s = ramp_scale((uint32_t)ramp->u.harmonic.q8, magnitude((int32_t)spacing2), mid2);
     } else {
-        uint32_t total = new_q * group;
-        ramp->excess_q8 = 0;
-        if (group > 1 && !capped) {
-            uint32_t s = from_scratch ? ramp_scale(new_q, 2 * step * group, mid2)
-                                      : magnitude(ramp->u.harmonic.slope + ramp->u.harmonic.curve / 2);
-            if (s > 96) {
-                s = excess(new_q, s, group);
-                ramp->excess_q8 = (uint16_t)s;
-                total += s;
-            }
-        }
-        sum->ticks = total >> 8;
-        sum->frac = (uint8_t)total;
-        ticks = new_q >> 8;
+        ramp_step(ramp);
+        s = magnitude(ramp->u.harmonic.slope + (ramp->u.harmonic.curve >> 1));
     }
+    uint32_t q = ramp->u.harmonic.q8;
+    uint32_t total = q * group;
+    s = group > 1 && s > 96 ? excess(q, s, group) : 0;
+    ramp->excess_q8 = (uint16_t)s;
+    total += s;
+    sum->ticks = total >> 8;
+    sum->frac = (uint8_t)total;
+}
+
+/* True if neither standstill nor the bound is near. */
+static bool linear_next(ramp_t *ramp, bool from_scratch, ramp_time_t *sum)
+{
+    if (from_scratch) {
+        uint32_t q_before = ramp->u.linear.sum_q4;
+        int32_t slope_before = ramp->u.linear.slope;
+        ramp->u.linear.slope = (int32_t)(estimate(ramp) - q_before);
+        ramp->u.linear.curve = 0;
+        ramp_step(ramp);
+        follow(ramp, q_before, slope_before);
+    } else {
+        ramp_step(ramp);
+    }
+    uint32_t q = ramp->u.linear.sum_q4;
+    uint32_t bound_q8 = ramp->bound_q8;
+    uint8_t group = ramp->group;
+    if (group > 1)
+        bound_q8 = bound_q8 >> 24 ? UINT32_MAX : bound_q8 * group;
+    uint32_t bound_q4 = bound_q8 >> 4;
+    uint32_t slope = magnitude(ramp->u.linear.slope) << 4;
+    sum->ticks = q >> 4;
+    sum->frac = (uint8_t)(q << 4);
+    if (ramp->faster ? q < bound_q4 : q > bound_q4) {
+        uint16_t carry = (uint16_t)(ramp->bound_carry + group * ramp->bound_q16);
+        ramp->bound_carry = (uint8_t)carry;
+        bound_q8 += carry >> 8;
+        sum->ticks = bound_q8 >> 8;
+        sum->frac = (uint8_t)bound_q8;
+    }
+    if (q >> 9 >= (uint32_t)wide_from_byte(&ramp->u.linear.t2_q4, 2))
+        return false;
+    return ramp->faster ? q >= bound_q4 + slope : q + 2 * slope <= bound_q4;
+}
+
+uint16_t ramp_next(ramp_t *ramp, const ramp_constants_t *constants, uint32_t left, ramp_time_t *sum)
+{
+    bool steady = !begin_group(ramp, left);
+    if (ramp->linear)
+        steady = linear_next(ramp, !steady, sum) && steady;
+    else
+        harmonic_next(ramp, constants, !steady, sum);
+    uint16_t group = ramp->group;
+    uint16_t ticks = last_ticks(ramp);
     /* The same again for a while, without looking at everything. */
-    if (steady && ticks < STEADY_MAX_TICKS && (group >= 4 || ticks >= STEADY_MIN_TICKS))
-        ramp->steady = STEADY_GROUPS;
+    ramp->steady = steady && (group & (group - 1)) == 0 && ticks < STEADY_MAX_TICKS &&
+                           (group >= 4 || ticks >= STEADY_MIN_TICKS)
+                       ? STEADY_GROUPS
+                       : 0;
     return group;
 }

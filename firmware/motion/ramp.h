@@ -34,12 +34,13 @@ typedef struct {
     uint8_t steady;       /* groups that may follow in the same way before their size is reviewed */
     uint8_t group_log2;   /* of the last group's pulses, rounded down */
     uint8_t seen;         /* groups of one size so far that followed each other; from 3 on slope and curve are right */
+    uint8_t group;        /* pulses of the last group */
+    uint8_t group_limit;  /* what the next group would like to be */
     uint16_t excess_q8;   /* what a steady group's sum exceeds its middle times its pulses by */
-    uint16_t group;       /* pulses of the last group */
-    uint16_t group_limit; /* what the next group would like to be */
     uint32_t bound_q8;    /* linear: no interval above while slowing, none below while speeding up */
     uint8_t bound_q16;    /* its next eight bits: 1/65536 tick */
     uint8_t bound_carry;  /* of those */
+    bool capped;          /* harmonic: the last group was at cap2 */
     union {
         struct {
             uint32_t q8;       /* interval in the middle of the last group */

@@ -6,15 +6,15 @@
 #define RAMP_FASTER 1
 #define RAMP_GROUP_LOG2 3
 /* Both laws: the last value, its change, the change of that. */
-#define RAMP_Q8 17
-#define RAMP_SLOPE 21
-#define RAMP_CURVE 25
-#define RAMP_NEXT2 29
-#define RAMP_SPACING2 41
-#define RAMP_MID2 45
-#define RAMP_K512 49
-#define RAMP_T2 29
-#define RAMP_REST 37
-#define RAMP_GROUP_C 45
+#define RAMP_Q8 16
+#define RAMP_SLOPE 20
+#define RAMP_CURVE 24
+#define RAMP_NEXT2 28
+#define RAMP_SPACING2 40
+#define RAMP_MID2 44
+#define RAMP_K512 48
+#define RAMP_T2 28
+#define RAMP_REST 36
+#define RAMP_GROUP_C 44
 
 #endif
