@@ -180,7 +180,7 @@ static status_t command_pulses(const char *rest)
 static status_t command_toggle_steps(const char *rest)
 {
     (void)rest;
-    session_set_pulses(!(session.flags & MOTION_PULSES));
+    session.flags ^= MOTION_PULSES;
     return STATUS_OK;
 }
 

@@ -11,24 +11,24 @@ void session_init(void)
     session_set_pulses(settings.full_step == 0);
 }
 
+static void set_flag(uint8_t flag, bool on)
+{
+    session.flags |= flag;
+    if (!on) {
+        session.flags ^= flag;
+    }
+}
+
 void session_set_linear(bool linear)
 {
-    if (linear) {
-        session.flags |= MOTION_LINEAR;
-    } else {
-        session.flags &= (uint8_t)~MOTION_LINEAR;
-    }
+    set_flag(MOTION_LINEAR, linear);
     session.accel = settings.accel[linear];
     session.decel = settings.decel[linear];
 }
 
 void session_set_pulses(bool pulses)
 {
-    if (pulses) {
-        session.flags |= MOTION_PULSES;
-    } else {
-        session.flags &= (uint8_t)~MOTION_PULSES;
-    }
+    set_flag(MOTION_PULSES, pulses);
 }
 
 void session_template(const session_t *from, motion_command_t *command)
