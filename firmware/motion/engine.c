@@ -52,7 +52,8 @@ static uint16_t owed;            /* held pulses still to be left out */
 static int32_t carry_q8;         /* 1/256 ticks rounded off so far */
 static uint16_t ahead_ticks;     /* part of the next interval that has been emitted as silence */
 static bool dir_due;             /* the next single period sets the dir pin */
-static profile_interval_t closing; /* of the last command emitted */
+static uint32_t closing_chunks;  /* closing interval of the last command emitted: so many PROFILE_CHUNK_TICKS ... */
+static uint16_t closing_ticks;   /* ... and these */
 static uint8_t tail_offset;      /* its tail segment, while stage is REST, GAP or END */
 static bool tail_valid;          /* a command can still be joined to it */
 static bool tail_awaited;        /* it has not begun yet: its command has not ended */
@@ -168,9 +169,11 @@ static void add_pulses(uint8_t flags, uint16_t pulses)
         emitted += pulses;
 }
 
+/* Is the one-period segment at `offset` being played, or over? (It is loaded one period before it begins, and what comes
+ * after it when it begins.) */
 static bool has_begun(uint8_t offset)
 {
-    return (uint8_t)(step_head - offset) > (uint8_t)(step_head - step_tail);
+    return step_idle || (uint8_t)(step_head - offset) > (uint8_t)(step_head - step_tail + SEGMENT_BYTES);
 }
 
 /* The command whose closing interval has begun its tail has ended. */
@@ -182,6 +185,13 @@ static void look_for_end(void)
         tail_awaited = false;
         ended++;
     }
+}
+
+static uint16_t give(uint32_t *phase, uint16_t pulses)
+{
+    uint16_t some = *phase < pulses ? (uint16_t)*phase : pulses;
+    *phase -= some;
+    return (uint16_t)(pulses - some);
 }
 
 /* The interrupt has repeated the last interval because the ring was empty: so many pulses fewer are to be made. Returns
@@ -197,15 +207,14 @@ static uint16_t absorb_held(void)
     faults |= ENGINE_FAULT_STARVED;
     add_pulses(step_flags, held);
     /* The cruise becomes shorter, or, where there is none, the ramps; the closing interval stays. */
-    uint32_t *phases[] = {&profile.cruise_pulses, &profile.accel_pulses, &profile.decel_pulses};
     uint32_t left = profile_pulses_left();
-    uint16_t given = left > held ? held : left ? (uint16_t)(left - 1) : 0;
+    if (left == 0)
+        return held;
+    uint16_t given = left > held ? held : (uint16_t)(left - 1);
     held = (uint16_t)(held - given);
-    for (uint8_t i = 0; i < 3; i++) {
-        uint16_t some = *phases[i] < given ? (uint16_t)*phases[i] : given;
-        *phases[i] -= some;
-        given = (uint16_t)(given - some);
-    }
+    given = give(&profile.cruise_pulses, given);
+    given = give(&profile.accel_pulses, given);
+    give(&profile.decel_pulses, given);
     return held;
 }
 
@@ -245,6 +254,16 @@ static void push(uint16_t periods, uint16_t top, bool pulse, motion_state_t stat
     if (periods)
         step_head = (uint8_t)(step_head + SEGMENT_BYTES);
     step_port_unlock(lock);
+}
+
+/* The interval that ends with the pulse of the segment at `offset`: its period and the silence before it. */
+static uint32_t interval_at(uint8_t offset)
+{
+    uint32_t ticks = period_ticks(segment_at(offset));
+    const segment_t *before = segment_at((uint8_t)(offset - SEGMENT_BYTES));
+    if (is_silent(before))
+        ticks += period_ticks(before) * counted_periods(before);
+    return ticks;
 }
 
 static int32_t signed_pulses(const segment_t *s, uint16_t pulses)
@@ -497,8 +516,8 @@ static void begin_closing(void)
     }
     p->accel_pulses = p->cruise_pulses = p->decel_pulses = 0;
     ramp_state = state; /* the body belongs to the phase */
-    closing.chunks = chunks;
-    closing.ticks_q8 = ticks << 8;
+    closing_chunks = chunks;
+    closing_ticks = (uint16_t)ticks;
     tail_fast = chunks == 0 && ticks < SEGMENT_EARLY1_BELOW_TICKS;
     stage = STAGE_TAIL;
     if (chunks || ticks >= 2 * TAIL_TICKS) {
@@ -513,8 +532,8 @@ static void begin_closing(void)
 static void push_tail(void)
 {
     uint16_t ticks = TAIL_TICKS;
-    if (closing.chunks == 0 && closing.ticks_q8 >> 8 < 2 * TAIL_TICKS) {
-        ticks = (uint16_t)(closing.ticks_q8 >> 8);
+    if (closing_chunks == 0 && closing_ticks < 2 * TAIL_TICKS) {
+        ticks = closing_ticks;
         if (ahead_ticks)
             ahead_ticks = 0;
     }
@@ -579,9 +598,11 @@ static bool emit(void)
         stage = STAGE_GAP;
         return true;
     case STAGE_GAP:
+        if (next_taken)
+            return false; /* it will be joined */
         ramp_state = MOTION_STANDBY;
         if (gap_on)
-            set_interval(closing.chunks, tail_fast ? SHORTEST_PIECE_TICKS : closing.ticks_q8 >> 8, false);
+            set_interval(closing_chunks, tail_fast ? SHORTEST_PIECE_TICKS : closing_ticks, false);
         stage = STAGE_END;
         return true;
     case STAGE_END:
@@ -758,8 +779,8 @@ static void join_next(void)
         return;
     }
     /* Longer than the gap the wait means a start from slow speed. */
-    if (wait >= SHORTEST_PIECE_TICKS && closing.chunks < 0x10000u &&
-        wait > (closing.chunks << PROFILE_CHUNK_LOG2) + (closing.ticks_q8 >> 8))
+    if (wait >= SHORTEST_PIECE_TICKS && closing_chunks < 0x10000u &&
+        wait > (closing_chunks << PROFILE_CHUNK_LOG2) + closing_ticks)
         expire_gap();
     plan();
     joined_offset = tail_offset;
@@ -823,16 +844,17 @@ bool engine_poll(void)
     if (playing && step_idle) {
         if (!step_port_snapshot().period_over) {
             /* The last period is not over. */
-        } else if (stage == STAGE_REST && step_head == step_tail) {
+        } else if ((stage == STAGE_REST || stage == STAGE_GAP) && step_head == step_tail) {
             step_port_halt();
             playing = false;
             tail_valid = false;
             single = false;
-            expire_gap();
             if (next_taken) {
                 next_taken = false;
                 command = next;
                 start_now();
+            } else {
+                expire_gap();
             }
         } else if (step_head != step_tail) {
             /* The planner was so late that the timer ran out of segments: go on where it stopped. */
@@ -903,63 +925,45 @@ void engine_stop(void)
     in_play_cycle_us = 0;
 }
 
-/* Ends the running command after what is to be played soon. Returns the velocity there; 0: nothing to be cut (it ends
- * by itself now, or it was frozen in the middle of a slow interval or a wait). */
+/* Ends the running command after what is to be played soon. Returns the interval there in ticks; 0: nothing to be cut
+ * (it ends by itself now, or it stands in the middle of a wait or of an interval longer than that of slow speed). */
 static uint32_t cut(void)
 {
     step_snapshot_t at = step_port_snapshot();
     uint8_t offset = (uint8_t)(at.tail - SEGMENT_BYTES);
     uint16_t left = at.to_count;
-    uint32_t kept_ticks = 0;
-    uint32_t interval_ticks = 0; /* silent part of the interval */
+    uint32_t keep_ticks = CUT_KEEP_TICKS;
+    const segment_t *s;
     for (;;) {
-        if (offset == step_head) {
-            /* All of it is soon over, or the ring is only a little ahead: go on from its end. */
-            if (stage != STAGE_RUN && stage != STAGE_LEAD)
+        s = segment_at(offset);
+        uint32_t period = period_ticks(s);
+        uint32_t ticks = period * left;
+        if (is_silent(s)) {
+            if ((s->flags & SEGMENT_STATE_MASK) == MOTION_STOP)
                 return 0;
-            offset = (uint8_t)(offset - SEGMENT_BYTES);
-            left = counted_periods(segment_at(offset));
+        } else if (ticks >= keep_ticks || (uint8_t)(offset + SEGMENT_BYTES) == step_head) {
+            uint16_t needed = (uint16_t)(keep_ticks / period + 4u);
+            if (needed < left)
+                left = needed;
             break;
         }
-        const segment_t *s = segment_at(offset);
-        if ((s->flags & SEGMENT_STATE_MASK) == MOTION_STOP && is_silent(s))
-            return 0;
-        uint16_t period = (uint16_t)(s->top + 1u);
-        if (!is_silent(s)) {
-            uint16_t needed = 1;
-            if (kept_ticks < CUT_KEEP_TICKS)
-                needed = (uint16_t)((CUT_KEEP_TICKS - kept_ticks) / (period ? period : 65535u) + 4u);
-            if (needed <= left) {
-                left = needed;
-                interval_ticks += period_ticks(s);
-                break;
-            }
-            interval_ticks = 0;
-        } else {
-            interval_ticks += period_ticks(s) * left;
-        }
-        kept_ticks += period_ticks(s) * left;
+        keep_ticks = keep_ticks > ticks ? keep_ticks - ticks : 0;
         offset = (uint8_t)(offset + SEGMENT_BYTES);
-        if (offset != step_head)
-            left = counted_periods(segment_at(offset));
+        if (offset == step_head)
+            return 0;
+        left = counted_periods(segment_at(offset));
     }
-    const segment_t *last = segment_at(offset);
-    if (is_silent(last) || profile.v_exit == 0)
-        return 0;
+    uint32_t interval_ticks = interval_at(offset);
     if (interval_ticks > basis.slow_ticks + 1)
         return 0;
     emitted -= pulses_from((uint8_t)(offset + SEGMENT_BYTES));
-    emitted -= signed_pulses(last, step_port_shorten(offset, left));
+    emitted -= signed_pulses(s, step_port_shorten(offset, left));
     tail_awaited = false;
+    tail_valid = false;
     silence_chunks = 0;
     piece_ticks = 0;
     ahead_ticks = 0;
-    tail_valid = false;
-    closing.chunks = 0;
-    closing.ticks_q8 = period_ticks(last) << 8;
-    if (interval_ticks == 0)
-        interval_ticks = period_ticks(last);
-    return ramp_velocity(&basis.ramp, interval_ticks);
+    return interval_ticks;
 }
 
 /* Ends the running command with a deceleration, or none. */
@@ -970,8 +974,8 @@ static void end_command(accel_code_t decel, bool linear)
     motion_state_t state = engine_state();
     if (state == MOTION_STOP || (state == MOTION_DECEL && decel != ACCEL_NONE))
         return; /* ending already */
-    uint32_t v = state == MOTION_STANDBY ? 0 : cut();
-    if (v == 0) {
+    uint32_t ticks = state == MOTION_STANDBY ? 0 : cut();
+    if (ticks == 0) {
         if (state == MOTION_STANDBY || stage == STAGE_RUN || silence_chunks || piece_ticks) {
             /* In a start wait or at slow speed: there is nothing to ramp down from. */
             halt();
@@ -980,10 +984,9 @@ static void end_command(accel_code_t decel, bool linear)
         }
         return;
     }
-    ramp_time_t interval = ramp_interval(&basis.ramp, v);
-    profile_plan_decel(&profile, &basis, v, decel, linear);
-    profile.cruise.chunks = interval.ticks >> PROFILE_CHUNK_LOG2;
-    profile.cruise.ticks_q8 = (interval.ticks & (PROFILE_CHUNK_TICKS - 1)) << 8;
+    profile_plan_decel(&profile, &basis, ramp_velocity(&basis.ramp, ticks), decel, linear);
+    profile.cruise.chunks = ticks >> PROFILE_CHUNK_LOG2;
+    profile.cruise.ticks_q8 = (ticks & (PROFILE_CHUNK_TICKS - 1)) << 8;
     if (profile.decel_pulses == 0)
         profile.cruise_pulses = 1; /* the closing interval */
     ramp_state = MOTION_STANDBY;
@@ -1047,19 +1050,10 @@ void engine_velocity(uint32_t *rpm, uint32_t *cycle_us)
         exact_cycle_us = profile.cycle_us;
         v = profile_rpm(&basis, &command) * 100u << basis.factor_log2;
     } else if (playing && (state == MOTION_ACCEL || state == MOTION_DECEL)) {
-        /* The interval being played: its silent part, if any, is the segment before its last period. */
-        uint8_t offset = (uint8_t)(step_port_snapshot().tail - SEGMENT_BYTES);
-        uint32_t ticks = 0;
-        for (uint8_t i = 0; i < 2; i++) {
-            const segment_t *s = segment_at(offset);
-            ticks += period_ticks(s) * (is_silent(s) ? counted_periods(s) : 1u);
-            if (!is_silent(s))
-                break;
+        uint8_t offset = (uint8_t)(step_tail - SEGMENT_BYTES);
+        if (is_silent(segment_at(offset)))
             offset = (uint8_t)(offset + SEGMENT_BYTES);
-            if (offset == step_head)
-                break;
-        }
-        v = ramp_velocity(&basis.ramp, ticks);
+        v = ramp_velocity(&basis.ramp, interval_at(offset));
         exact_cycle_us = 0;
     }
     *rpm = (v >> basis.factor_log2) / 100u;
