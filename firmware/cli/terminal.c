@@ -9,10 +9,10 @@
 #include "cli/timebase_port.h"
 #include "version.h"
 
-/* At a high rate several bytes are taken in one round of the main loop, but not beyond the end of a line. */
-enum { BYTES_AT_ONCE = 8 };
+/* At a high rate so many bytes are taken in one round of the main loop, but not beyond the end of a line, ... */
+enum { BYTES_AT_ONCE = 28 };
 
-/* With more than these waiting to be taken, the output rests, and so many lines are executed in one round. */
+/* ... unless more than these wait to be taken: then the output rests, and so many lines are executed in one round. */
 enum { PRESSED_BYTES = 16, PRESSED_LINES = 3 };
 
 static const char version_line[] FLASH = "SAC " VERSION_NUMBER " " VERSION_DATE "\r\n";
@@ -183,19 +183,19 @@ void terminal_init(void)
 }
 
 /* Takes what has arrived, up to the first byte that ends or changes a line otherwise than by one more character. */
-static line_event_t take(bool *worked)
+static line_event_t take(uint8_t *bytes)
 {
-    for (uint8_t bytes = BYTES_AT_ONCE; bytes > 0; bytes--) {
+    for (; *bytes > 0; --*bytes) {
         const int16_t byte = terminal_port_get();
         if (byte < 0) {
             break;
         }
-        *worked = true;
         if (byte == TERMINAL_PORT_DAMAGED) {
             line_damage(&line);
         } else if (!line_is_blank(&line) || begin_line((uint8_t)byte)) {
             const line_event_t event = line_take(&line, (uint8_t)byte);
             if (event > LINE_APPENDED) {
+                --*bytes;
                 return event;
             }
         }
@@ -205,9 +205,10 @@ static line_event_t take(bool *worked)
 
 bool terminal_poll(void)
 {
+    uint8_t bytes = BYTES_AT_ONCE; /* still to be taken in this round */
     bool worked = false;
     for (uint8_t lines = PRESSED_LINES; lines > 0; lines--) {
-        const line_event_t event = take(&worked);
+        const line_event_t event = take(&bytes);
         if (event == LINE_ERASED) {
             erase();
         }
@@ -215,7 +216,7 @@ bool terminal_poll(void)
             worked |= echo();
         }
         if (event != LINE_ENDED) {
-            if (worked) {
+            if (bytes != BYTES_AT_ONCE) {
                 commands_read_ahead(line.text, line.length);
             }
             if (event == LINE_CLEARED) {
@@ -231,5 +232,5 @@ bool terminal_poll(void)
     if (behind && terminal_port_waiting() <= PRESSED_BYTES) {
         worked |= pay();
     }
-    return worked;
+    return worked || bytes != BYTES_AT_ONCE;
 }
