@@ -1,6 +1,9 @@
 /* See profile.h. */
 #include "motion/profile.h"
+#include "base/inline.h"
 #include "base/wide.h"
+
+#define NO_RAMP_CENTI 99900u /* of ACCEL_NONE */
 
 void profile_basis(profile_basis_t *basis, uint16_t steps_per_rev, uint8_t factor_log2, uint8_t slow_rpm)
 {
@@ -21,16 +24,6 @@ uint32_t profile_rpm(const profile_basis_t *basis, const motion_command_t *comma
 uint32_t profile_cycle_us(const profile_basis_t *basis, const motion_command_t *command)
 {
     return command->flags & MOTION_CYCLE ? command->velocity : basis->us_rpm / command->velocity;
-}
-
-/* Cycle of a full step, divided by the microsteps. */
-static profile_interval_t pulse_interval(uint32_t cycle_us, uint8_t factor_log2)
-{
-    uint8_t chunk_us_log2 = (uint8_t)(PROFILE_CHUNK_LOG2 - 4 + factor_log2); /* 16 ticks a microsecond */
-    profile_interval_t interval;
-    interval.chunks = cycle_us >> chunk_us_log2;
-    interval.ticks_q8 = ((cycle_us & (((uint32_t)1 << chunk_us_log2) - 1)) << 12) >> factor_log2;
-    return interval;
 }
 
 status_t profile_check(const profile_basis_t *basis, const motion_command_t *command, uint8_t pulse_us)
@@ -82,42 +75,53 @@ static void linear_steps(wide_t *steps, const profile_basis_t *basis, uint32_t v
     wide_divide(steps, centi);
 }
 
-/* Full steps of a ramp between two velocities. */
-static void ramp_steps(wide_t *steps, const profile_basis_t *basis, uint32_t v_from, uint32_t v_to, uint32_t centi,
-                       bool linear)
+/* Full steps of the profile's ramp from a velocity to v_peak. */
+static void ramp_steps(wide_t *steps, const profile_basis_t *basis, const profile_t *profile, uint32_t v_from,
+                       uint32_t centi)
 {
-    if (v_from > v_to) {
-        uint32_t v = v_from;
-        v_from = v_to;
-        v_to = v;
-    }
-    if (!linear) {
-        *steps = ((v_to - v_from) >> basis->factor_log2) / centi;
+    uint32_t v_to = profile->v_peak;
+    *steps = 0;
+    /* Within the slow range there are no ramps (manual lines 159, 169). */
+    if (v_to <= basis->v_slow || centi == NO_RAMP_CENTI)
+        return;
+    if (!profile->linear) {
+        *steps = ((v_to > v_from ? v_to - v_from : v_from - v_to) >> basis->factor_log2) / centi;
         return;
     }
     linear_steps(steps, basis, v_to, centi);
-    if (v_from) {
+    if (v_from != basis->v_slow) { /* otherwise it starts from zero (decisions 0.2.4) */
         wide_t from;
         linear_steps(&from, basis, v_from, centi);
-        wide_subtract(steps, &from);
+        wide_subtract(&from, steps);
+        *steps = from;
+        if (is_negative(&from)) {
+            wide_subtract(steps, &from);
+            wide_subtract(steps, &from);
+        }
     }
 }
 
 uint32_t profile_ramp_steps(const profile_basis_t *basis, uint32_t v_from, uint32_t v_to, uint32_t centi, bool linear)
 {
+    profile_t profile = {.v_peak = v_to, .linear = linear};
     wide_t steps;
-    ramp_steps(&steps, basis, v_from, v_to, centi, linear);
+    ramp_steps(&steps, basis, &profile, v_from, centi);
     return wide_half(&steps, 1) ? UINT32_MAX : wide_half(&steps, 0);
 }
 
-/* Change of v^2 over so many pulses of a linear ramp, in units^2: 2 * alpha * accel = 114591.559 centi F / sprf each. */
-static void square_change(wide_t *change, const profile_basis_t *basis, uint32_t pulses, uint32_t centi)
+/* v2 +-= the change of v^2 over so many pulses of a linear ramp, in units^2: 2 * alpha * accel = 114591.559 centi F /
+ * sprf each. */
+static void add_change(wide_t *v2, const profile_basis_t *basis, uint32_t pulses, uint32_t centi, bool add)
 {
-    *change = pulses;
-    multiply(change, centi << basis->factor_log2);
-    multiply(change, 916732); /* 8 * 114591.559 to 5 parts in 10^7 */
-    wide_divide(change, basis->steps_per_rev);
-    wide_shift(change, 3);
+    wide_t change = pulses;
+    multiply(&change, centi << basis->factor_log2);
+    multiply(&change, 916732); /* 8 * 114591.559 to 5 parts in 10^7 */
+    wide_divide(&change, basis->steps_per_rev);
+    wide_shift(&change, 3);
+    if (add)
+        wide_add(v2, &change);
+    else
+        wide_subtract(v2, &change);
 }
 
 static uint32_t root(const wide_t *x)
@@ -125,148 +129,56 @@ static uint32_t root(const wide_t *x)
     return is_negative(x) ? 0 : wide_root(x);
 }
 
-/* The velocity that the acceleration reaches (v_peak), and that of its last interval. */
-static uint32_t reached(profile_t *profile, const profile_basis_t *basis, uint32_t v_target)
+static uint32_t limited(const profile_t *profile, uint32_t v)
 {
-    uint32_t v_peak;
-    uint32_t v_last;
+    uint32_t most = profile->v_peak;
+    return (v > most) == profile->faster ? most : v;
+}
+
+/* The velocity that the acceleration reaches instead of v_peak, and that of its last interval: v_exit. */
+static NOINLINE void limit_peak(profile_t *profile, const profile_basis_t *basis)
+{
+    uint32_t v_peak = profile->v_start;
+    uint32_t v_last = v_peak;
     uint32_t pulses = profile->accel_pulses;
     bool faster = profile->faster;
-    if (profile->linear) {
+    if (pulses == 0) {
+        profile->v_peak = v_peak;
+    } else if (profile->linear) {
         wide_t v2 = 0;
-        wide_t change;
-        if (profile->v_start != basis->v_slow || !faster)
-            square(&v2, profile->v_start);
-        square_change(&change, basis, pulses, profile->accel_centi);
-        if (faster)
-            wide_add(&v2, &change);
-        else
-            wide_subtract(&v2, &change);
+        if (v_peak != basis->v_slow || !faster)
+            square(&v2, v_peak);
+        add_change(&v2, basis, pulses, profile->accel_centi, faster);
         v_peak = root(&v2);
-        square_change(&change, basis, 1, profile->accel_centi);
-        if (faster)
-            wide_subtract(&v2, &change);
-        else
-            wide_add(&v2, &change);
+        add_change(&v2, basis, 1, profile->accel_centi, !faster);
         v_last = (v_peak + root(&v2)) / 2; /* the mean of its two ends */
     } else {
         uint32_t step = faster ? profile->accel_centi : 0u - profile->accel_centi;
-        v_peak = profile->v_start + step * pulses;
+        v_peak += step * pulses;
         v_last = v_peak - step;
     }
-    if (faster ? v_peak > v_target : v_peak < v_target)
-        v_peak = v_target;
-    if (faster ? v_last > v_target : v_last < v_target)
-        v_last = v_target;
-    profile->v_peak = v_peak;
-    return v_last;
+    profile->v_exit = limited(profile, v_last);
+    profile->v_peak = limited(profile, v_peak);
 }
 
-void profile_plan(profile_t *profile, const profile_basis_t *basis, const motion_command_t *command, uint32_t v_in)
+/* Would the deceleration's pulses leave the velocity above slow speed? */
+static NOINLINE bool is_steep(const profile_t *profile, const profile_basis_t *basis)
 {
-    uint8_t factor_log2 = basis->factor_log2;
-    uint32_t cycle_us = profile_cycle_us(basis, command);
-    uint32_t rpm = profile_rpm(basis, command);
-    /* Velocities above the range of units are refused by profile_check: a period of 2 us is far below it. */
-    uint32_t v_target = rpm * 100u << factor_log2;
-    uint32_t v_slow = basis->v_slow;
-
-    profile->cycle_us = cycle_us;
-    profile->cruise = pulse_interval(cycle_us, factor_log2);
-    profile->linear = (command->flags & MOTION_LINEAR) != 0;
-    profile->accel_centi = accel_centi(command->accel);
-    profile->decel_centi = accel_centi(command->decel);
-    profile->steep_decel = false;
-
-    uint32_t v_start = v_in < v_slow ? v_slow : v_in;
-    profile->v_start = v_start;
-    profile->faster = v_target > v_start;
-
-    /* Within the slow range there are no ramps (manual lines 159, 169). */
-    bool ramps = v_target > v_slow;
-    wide_t wide_accel = 0;
-    wide_t wide_decel = 0;
-    if (ramps && command->accel != ACCEL_NONE && v_start != v_target) {
-        uint32_t from = v_start;
-        if (profile->linear && v_start == v_slow)
-            from = 0; /* a linear ramp starts from zero (decisions 0.2.4) */
-        ramp_steps(&wide_accel, basis, from, v_target, profile->accel_centi, profile->linear);
-    }
-    if (ramps && command->decel != ACCEL_NONE)
-        ramp_steps(&wide_decel, basis, profile->linear ? 0 : v_slow, v_target, profile->decel_centi, profile->linear);
-
-    /* Full steps are truncated as full steps, so that a ramp covers the same steps whatever the factor. */
-    uint8_t after_log2 = factor_log2;
-    if (command->flags & MOTION_PULSES) {
-        while (after_log2) {
-            wide_add(&wide_accel, &wide_accel);
-            wide_add(&wide_decel, &wide_decel);
-            after_log2--;
-        }
-    }
-    /* Ramps beyond any command keep their ratio. */
-    bool truncated = false;
-    while (wide_half(&wide_accel, 1) || wide_half(&wide_decel, 1) ||
-           (uint32_t)wide_accel > UINT32_MAX - (uint32_t)wide_decel) {
-        wide_shift(&wide_accel, 1);
-        wide_shift(&wide_decel, 1);
-        truncated = true;
-    }
-    uint32_t accel = (uint32_t)wide_accel;
-    uint32_t decel = (uint32_t)wide_decel;
-    uint32_t total = command->count;
-    uint32_t whole = accel + decel;
-    uint32_t cruise = 0;
-    if (whole > total)
-        truncated = true;
-    if (truncated) {
-        uint32_t scaled = ramp_scale(decel, total, whole);
-        if (scaled > 1)
-            scaled = total - ramp_scale(accel, total, whole);
-        decel = scaled;
-        accel = total - decel;
-    } else {
-        cruise = total - whole;
-    }
-    profile->accel_pulses = accel << after_log2;
-    profile->decel_pulses = decel << after_log2;
-    profile->cruise_pulses = (cruise << after_log2) + (truncated ? 0 : command->extra_pulses);
-
-    /* The velocity reached, and the one that stays. */
-    uint32_t v_last = v_target; /* of the last interval, if it is one of the acceleration */
-    profile->v_peak = v_target;
-    if (truncated || cruise == 0)
-        v_last = profile->accel_pulses ? reached(profile, basis, v_target) : (profile->v_peak = v_start);
-    profile->exit_cycle_us = 0;
-    if (profile->decel_pulses != 0) {
-        profile->v_exit = v_slow;
-        if (profile->linear) {
-            /* Can the deceleration, and 2 % and four full steps more of it, take off v^2? */
-            wide_t able;
-            wide_t needed;
-            square_change(&able, basis,
-                          profile->decel_pulses + profile->decel_pulses / 50 + ((uint32_t)4 << factor_log2),
-                          profile->decel_centi);
-            square(&needed, profile->v_peak);
-            wide_subtract(&able, &needed);
-            profile->steep_decel = is_negative(&able);
-        } else {
-            profile->steep_decel =
-                profile->v_peak - v_slow > profile->decel_centi * (profile->decel_pulses + ((uint32_t)1 << factor_log2));
-        }
-    } else if (profile->cruise_pulses != 0) {
-        profile->v_exit = v_target;
-        profile->exit_cycle_us = cycle_us;
-    } else {
-        profile->v_exit = v_last;
-    }
+    uint32_t pulses = profile->decel_pulses;
+    uint32_t step = (uint32_t)1 << basis->factor_log2;
+    if (!profile->linear)
+        return profile->v_peak - basis->v_slow > profile->decel_centi * (pulses + step);
+    /* The v^2 that is left, after 2 % and four full steps more. */
+    wide_t v2;
+    square(&v2, profile->v_peak);
+    add_change(&v2, basis, pulses + pulses / 50 + 4 * step, profile->decel_centi, false);
+    return !is_negative(&v2);
 }
 
-void profile_plan_decel(profile_t *profile, const profile_basis_t *basis, uint32_t v, accel_code_t decel, bool linear)
+static void begin_plan(profile_t *profile, accel_code_t decel, bool linear, uint32_t v)
 {
     profile->accel_pulses = 0;
     profile->cruise_pulses = 0;
-    profile->decel_pulses = 0;
     profile->linear = linear;
     profile->faster = false;
     profile->steep_decel = false;
@@ -275,10 +187,99 @@ void profile_plan_decel(profile_t *profile, const profile_basis_t *basis, uint32
     profile->v_peak = v;
     profile->v_exit = v;
     profile->exit_cycle_us = 0;
-    if (decel == ACCEL_NONE || v <= basis->v_slow)
-        return;
-    uint32_t steps = profile_ramp_steps(basis, linear ? 0 : basis->v_slow, v, profile->decel_centi, linear);
-    profile->decel_pulses = steps << basis->factor_log2;
+}
+
+/* Splits the count, in full steps or pulses, into phases. True if the ramps had to be truncated. */
+static NOINLINE bool split(profile_t *profile, wide_t *wide_accel, wide_t *wide_decel, uint32_t total)
+{
+    bool truncated = false;
+    uint32_t accel;
+    uint32_t decel;
+    uint32_t whole;
+    for (;;) {
+        accel = wide_half(wide_accel, 0);
+        decel = wide_half(wide_decel, 0);
+        whole = accel + decel;
+        if (wide_bits(wide_accel) <= 32 && wide_bits(wide_decel) <= 32 && whole >= accel)
+            break;
+        /* Ramps beyond any command keep their ratio. */
+        wide_shift(wide_accel, 1);
+        wide_shift(wide_decel, 1);
+        truncated = true;
+    }
+    if (whole > total)
+        truncated = true;
+    if (truncated) {
+        decel = ramp_scale(decel, total, whole);
+        if (decel > 1)
+            decel = total - ramp_scale(accel, total, whole);
+        whole = total;
+        accel = total - decel;
+    }
+    profile->accel_pulses = accel;
+    profile->decel_pulses = decel;
+    profile->cruise_pulses = total - whole;
+    return truncated;
+}
+
+void profile_plan(profile_t *profile, const profile_basis_t *basis, const motion_command_t *command, uint32_t v_in)
+{
+    uint8_t factor_log2 = basis->factor_log2;
+    uint32_t cycle_us = profile_cycle_us(basis, command);
+    profile->cycle_us = cycle_us;
+    /* Of a full step, divided by the microsteps; 16 ticks a microsecond. */
+    uint8_t chunk_us_log2 = (uint8_t)(PROFILE_CHUNK_LOG2 - 4 + factor_log2);
+    profile->cruise.chunks = cycle_us >> chunk_us_log2;
+    profile->cruise.ticks_q8 = ((cycle_us & (((uint32_t)1 << chunk_us_log2) - 1)) << 12) >> factor_log2;
+
+    /* Velocities above the range of units are refused by profile_check: a period of 2 us is far below it. */
+    uint32_t v_target = profile_rpm(basis, command) * 100u << factor_log2;
+    begin_plan(profile, command->decel, (command->flags & MOTION_LINEAR) != 0, v_target);
+    profile->accel_centi = accel_centi(command->accel);
+    if (v_in < basis->v_slow)
+        v_in = basis->v_slow;
+    profile->v_start = v_in;
+    profile->faster = v_target > v_in;
+
+    wide_t accel;
+    wide_t decel;
+    ramp_steps(&accel, basis, profile, v_in, profile->accel_centi);
+    ramp_steps(&decel, basis, profile, basis->v_slow, profile->decel_centi);
+    /* Full steps are truncated as full steps, so that a ramp covers the same steps whatever the factor. */
+    uint8_t doublings = factor_log2;
+    if (command->flags & MOTION_PULSES) {
+        for (; doublings; doublings--) {
+            wide_add(&accel, &accel);
+            wide_add(&decel, &decel);
+        }
+    }
+    bool truncated = split(profile, &accel, &decel, command->count);
+    for (; doublings; doublings--) {
+        profile->accel_pulses *= 2;
+        profile->cruise_pulses *= 2;
+        profile->decel_pulses *= 2;
+    }
+    if (!truncated)
+        profile->cruise_pulses += command->extra_pulses;
+    if (profile->cruise_pulses == 0)
+        limit_peak(profile, basis);
+
+    /* The velocity that stays. */
+    if (profile->decel_pulses != 0) {
+        profile->v_exit = basis->v_slow;
+        profile->steep_decel = is_steep(profile, basis);
+    } else if (profile->cruise_pulses != 0) {
+        profile->v_exit = v_target;
+        profile->exit_cycle_us = cycle_us;
+    }
+}
+
+void profile_plan_decel(profile_t *profile, const profile_basis_t *basis, uint32_t v, accel_code_t decel, bool linear)
+{
+    begin_plan(profile, decel, linear, v);
+    wide_t steps;
+    ramp_steps(&steps, basis, profile, basis->v_slow, profile->decel_centi);
+    profile->decel_pulses = wide_half(&steps, 0) << basis->factor_log2;
     if (profile->decel_pulses != 0)
         profile->v_exit = basis->v_slow;
 }

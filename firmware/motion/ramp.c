@@ -136,7 +136,7 @@ uint32_t ramp_step(ramp_t *ramp)
         uint32_t mid2 = ramp->u.harmonic.mid2 + ramp->u.harmonic.spacing2;
         ramp->u.harmonic.mid2 = mid2;
         ramp->u.harmonic.next2 += ramp->u.harmonic.spacing2;
-        uint32_t rest = ramp->u.harmonic.k512 + (mid2 >> 1) - q * mid2;
+        uint32_t rest = ramp->u.harmonic.k512 - q * mid2;
         while ((int32_t)rest < 0) {
             rest += mid2;
             correction--;
@@ -146,7 +146,16 @@ uint32_t ramp_step(ramp_t *ramp)
             correction++;
         }
         q += correction;
-        sum = q << ramp->group_log2;
+        sum = q;
+        for (uint8_t bits = (uint8_t)(ramp->group_log2 + 1); bits; bits--) {
+            sum <<= 1;
+            rest <<= 1;
+            if (rest >= mid2) {
+                rest -= mid2;
+                sum++;
+            }
+        }
+        sum = (sum + 1) >> 1;
     }
     ramp->u.harmonic.q8 = q;
     ramp->u.harmonic.slope = (int32_t)(slope + correction);
@@ -474,14 +483,15 @@ static void harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, bool 
     uint32_t mid2 = next2 - step * (uint16_t)(group + 1);
     ramp->u.harmonic.mid2 = mid2;
     uint32_t s;
+    uint32_t total;
     if (from_scratch) {
         uint32_t q_before = ramp->u.harmonic.q8;
         mid2 += spacing2;
         ramp->u.harmonic.next2 = next2 + spacing2;
         if (ramp->capped)
             mid2 = ramp->u.harmonic.cap2;
-        wide_t q8;
-        divide_k(&q8, constants, mid2);
+        wide_t q8 = constants->k512;
+        uint32_t rest = wide_divide(&q8, mid2);
         ramp->u.harmonic.q8 = low_limited(&q8);
         if (ramp->u.harmonic.q8 == LONGEST_Q8) {
             /* Half a second and more, only at the start or end of a crawl: one by one. */
@@ -492,17 +502,21 @@ static void harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, bool 
         }
         ramp->u.harmonic.mid2 = mid2;
         follow(ramp, q_before, ramp->u.harmonic.slope);
+        total = ramp->u.harmonic.q8 * group;
+        if (group > 1)
+            total += ramp_scale(rest, group, mid2);
+        else if (rest > mid2 >> 1)
+            total++;
         s = 0;
         if (ramp->capped)
             ramp->seen = 0;
         else if (group > 1)
-            s = ramp_scale((uint32_t)ramp->u.harmonic.q8, magnitude((int32_t)spacing2), mid2);
+            s = ramp_scale(ramp->u.harmonic.q8, magnitude((int32_t)spacing2), mid2);
     } else {
-        ramp_step(ramp);
+        total = ramp_step(ramp);
         s = magnitude(ramp->u.harmonic.slope + (ramp->u.harmonic.curve >> 1));
     }
     uint32_t q = ramp->u.harmonic.q8;
-    uint32_t total = q * group;
     s = group > 1 && s > 96 ? excess(q, s, group) : 0;
     ramp->excess_q8 = (uint16_t)s;
     total += s;

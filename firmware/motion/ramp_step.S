@@ -1,9 +1,10 @@
-/* ramp_step() of ramp.h for the AVR: a ramp's steady state, with call and return about 230 cycles (harmonic) and
- * 640 cycles (linear), and 20 or 50 more for each correction.
+/* ramp_step() of ramp.h for the AVR: a ramp's steady state, with call and return about 300 cycles and 20 for each bit
+ * of group_log2 (harmonic) or 600 cycles (linear), and 15 or 60 more for each correction.
  *
  *   slope += curve;  q += slope
- *   harmonic: mid2 += spacing2;  next2 += spacing2;  rest = k512 + mid2 / 2 - q * mid2;
- *             while rest is not in 0..mid2 - 1: rest -+= mid2, one correction;  return q << group_log2
+ *   harmonic: mid2 += spacing2;  next2 += spacing2;  rest = k512 - q * mid2;
+ *             while rest is not in 0..mid2 - 1: rest -+= mid2, one correction;
+ *             return (q + rest / mid2) << group_log2, rounded
  *   linear:   t2 +-= q;  rest += group_c - q * t2;  t2 +-= q;
  *             while rest is not in 0..t2 - 1: t2 +-= 1, rest -+= t2, t2 +-= 1, one correction;  return q << 4
  *   q, slope and curve += corrections
@@ -72,20 +73,7 @@ harmonic:
         adc     r20, r14
         adc     r21, r15
         store4  r18, r19, r20, r21, RAMP_MID2
-        movw    r12, r18
-        movw    r14, r20
-        lsr     r15
-        ror     r14
-        ror     r13
-        ror     r12
-        ldd     r0, Z + RAMP_K512
-        add     r12, r0
-        ldd     r0, Z + RAMP_K512 + 1
-        adc     r13, r0
-        ldd     r0, Z + RAMP_K512 + 2
-        adc     r14, r0
-        ldd     r0, Z + RAMP_K512 + 3
-        adc     r15, r0
+        load4   r12, r13, r14, r15, RAMP_K512
         mul     r18, r22
         sub     r12, r0
         sbc     r13, r1
@@ -139,7 +127,38 @@ harmonic:
         sbc     r15, r21
         rjmp    2b
 3:      rcall   correct
-        ldd     r18, Z + 4 + RAMP_GROUP_LOG2
+        /* One bit more than the group's pulses have, from the rest; then rounded. */
+        ldd     r17, Z + 4 + RAMP_GROUP_LOG2
+        inc     r17
+4:      lsl     r22
+        rol     r23
+        rol     r24
+        rol     r25
+        lsl     r12
+        rol     r13
+        rol     r14
+        rol     r15
+        cp      r12, r18
+        cpc     r13, r19
+        cpc     r14, r20
+        cpc     r15, r21
+        brlo    5f
+        sub     r12, r18
+        sbc     r13, r19
+        sbc     r14, r20
+        sbc     r15, r21
+        inc     r22
+5:      dec     r17
+        brne    4b
+        subi    r22, 0xFF
+        sbci    r23, 0xFF
+        sbci    r24, 0xFF
+        sbci    r25, 0xFF
+        lsr     r25
+        ror     r24
+        ror     r23
+        ror     r22
+        rjmp    leave
 shift:  subi    r18, 1
         brcs    leave
         lsl     r22
@@ -158,19 +177,17 @@ leave:  clr     r1
 
 /* Adds r27:r26 to curve, slope and q; returns q in r22-r25 and leaves 4 less in Z. */
 correct:
-        movw    r12, r26
-        clr     r14
-        sbrc    r13, 7
-        com     r14
-        mov     r15, r14
+        clr     r16
+        sbrc    r27, 7
+        com     r16
         adiw    r30, RAMP_CURVE - RAMP_Q8
         rcall   5f
         rcall   5f
 5:      load4   r22, r23, r24, r25, RAMP_Q8
-        add     r22, r12
-        adc     r23, r13
-        adc     r24, r14
-        adc     r25, r15
+        add     r22, r26
+        adc     r23, r27
+        adc     r24, r16
+        adc     r25, r16
         store4  r22, r23, r24, r25, RAMP_Q8
         sbiw    r30, RAMP_SLOPE - RAMP_Q8
         ret
