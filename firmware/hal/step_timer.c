@@ -104,39 +104,42 @@ step_snapshot_t step_port_snapshot(void)
 
 void step_port_halt(void)
 {
-    if (!(TIMSK1 & 1 << TOIE1)) {
-        /* Stopped, or playing uncounted silence. */
-        TCCR1B = MODE15_B;
-        TIFR1 = 1 << TOV1;
-        return;
-    }
-    for (;;) {
+    /* Until nobody counts: stopped, or playing uncounted silence. That may happen in here as well. */
+    while (TIMSK1 & 1 << TOIE1) {
+        /* Looked at with interrupts on: with them off it would take longer than such a period. */
+        uint8_t tail = step_tail;
+        const segment_t *loaded = segment_at((uint8_t)(tail - SEGMENT_BYTES));
+        const segment_t *before = segment_at((uint8_t)(tail - 2 * SEGMENT_BYTES));
+        bool fast = loaded->top < SEGMENT_EARLY1_BELOW_TICKS || before->top < SEGMENT_EARLY1_BELOW_TICKS;
         cli();
-        if (!(TIFR1 & 1 << TOV1)) {
-            uint8_t loaded_offset = (uint8_t)(step_tail - SEGMENT_BYTES);
-            const segment_t *s = segment_at(loaded_offset);
+        if (tail == step_tail && !(TIFR1 & 1 << TOV1)) {
+            if (fast) {
+                /* A pulse is due or there, and over in a moment: freeze right behind it. */
+                while (!(TIFR1 & 1 << TOV1))
+                    ;
+                TCCR1B = MODE15_B;
+                TIMSK1 = 0;
+                sei();
+                return;
+            }
+            const segment_t *s = loaded;
             if (GPIOR0 == s->count_low && GPIOR1 == s->count_high)
-                s = segment_at((uint8_t)(loaded_offset - SEGMENT_BYTES)); /* its last period is running */
+                s = before; /* its last period is running */
             uint16_t match = s->match;
             uint16_t now = TCNT1;
             if (match == SEGMENT_SILENT || (uint16_t)(now + FREEZE_TICKS) < match) {
                 TCCR1B = MODE15_B; /* no clock: nothing moves from here on */
-                break;
-            }
-            if (s->top < SEGMENT_EARLY1_BELOW_TICKS) {
-                /* The pulse is due or there, and over in a moment: freeze right behind it. */
-                while (!(TIFR1 & 1 << TOV1))
-                    ;
-                TCCR1B = MODE15_B;
-                break;
+                TIMSK1 = 0;
+                sei();
+                return;
             }
         }
         /* A pulse is due or there: let it pass. */
         sei();
         __asm__ __volatile__("nop\n\tnop");
     }
-    TIMSK1 = 0;
-    sei();
+    TCCR1B = MODE15_B;
+    TIFR1 = 1 << TOV1;
 }
 
 bool step_port_arm(uint8_t offset, uint16_t top, uint16_t match, uint8_t flags)
@@ -239,14 +242,4 @@ uint16_t step_port_shorten(uint8_t offset, uint16_t periods)
     left = (uint16_t)(left - wanted);
     set_less_one(s, (uint16_t)(planned - left));
     return left;
-}
-
-uint8_t step_port_lock(void)
-{
-    return atomic_begin();
-}
-
-void step_port_unlock(uint8_t state)
-{
-    atomic_end(state);
 }

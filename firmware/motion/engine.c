@@ -1,5 +1,6 @@
 /* See engine.h; why it is built this way: docs/design.md. */
 #include "motion/engine.h"
+#include "base/atomic.h"
 #include "motion/profile.h"
 #include "motion/ramp.h"
 #include "motion/segment.h"
@@ -198,10 +199,10 @@ static uint16_t give(uint32_t *phase, uint16_t pulses)
  * how many of them the phases to come could not give. */
 static uint16_t absorb_held(void)
 {
-    uint8_t lock = step_port_lock();
+    uint8_t lock = atomic_begin();
     uint16_t held = step_held;
     step_held = 0;
-    step_port_unlock(lock);
+    atomic_end(lock);
     if (held == 0)
         return 0;
     faults |= ENGINE_FAULT_STARVED;
@@ -249,11 +250,11 @@ static void push(uint16_t periods, uint16_t top, bool pulse, motion_state_t stat
     s->count_high = (uint8_t)((uint16_t)(counted - 1) >> 8);
     s->flags = flags;
     uint8_t hold = pulse ? pulses_to_come() : 0;
-    uint8_t lock = step_port_lock();
+    uint8_t lock = atomic_begin();
     step_hold = hold > step_held ? (uint8_t)(hold - step_held) : 0; /* those held meanwhile will be given back */
     if (periods)
         step_head = (uint8_t)(step_head + SEGMENT_BYTES);
-    step_port_unlock(lock);
+    atomic_end(lock);
 }
 
 /* The interval that ends with the pulse of the segment at `offset`: its period and the silence before it. */
@@ -384,9 +385,9 @@ static void emit_steady(uint32_t *left, uint32_t at_most, bool faster, motion_st
     /* What may be held meanwhile leaves enough for the groups made here. */
     uint32_t spare = profile_pulses_left() - STEADY_MOST_GROUPS * pulses;
     if (spare < 255) {
-        uint8_t lock = step_port_lock();
+        uint8_t lock = atomic_begin();
         step_hold = (uint8_t)(spare - 1);
-        step_port_unlock(lock);
+        atomic_end(lock);
     }
     uint32_t sum_q8 = (uint32_t)carry_q8;
     uint16_t made = 0;

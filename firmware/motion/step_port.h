@@ -44,8 +44,4 @@ bool step_port_drop_after(uint8_t offset);
  * its periods were dropped. */
 uint16_t step_port_shorten(uint8_t offset, uint16_t periods);
 
-/* Holds interrupts off between the two, for a few cycles. */
-uint8_t step_port_lock(void);
-void step_port_unlock(uint8_t state);
-
 #endif
