@@ -28,13 +28,15 @@ int16_t terminal_port_get(void)
         return -1;
     }
     const uint8_t byte = usart_rx_bytes[tail];
-    usart_rx_tail = (uint8_t)((tail + 1) & (USART_RX_BYTES - 1));
+    usart_rx_tail = tail == USART_RX_BYTES - 1 ? 0 : (uint8_t)(tail + 1);
     return byte;
 }
 
 uint8_t terminal_port_waiting(void)
 {
-    return (uint8_t)((usart_rx_head - usart_rx_tail) & (USART_RX_BYTES - 1));
+    const uint8_t head = usart_rx_head;
+    const uint8_t tail = usart_rx_tail;
+    return (uint8_t)(head >= tail ? head - tail : head + USART_RX_BYTES - tail);
 }
 
 uint8_t terminal_port_free(void)

@@ -1,9 +1,10 @@
-/* What usart.c and usart_isr.S share. Sizes are powers of two: an index wraps by masking. */
+/* What usart.c and usart_isr.S share. */
 #ifndef HAL_USART_H
 #define HAL_USART_H
 
-#define USART_RX_BYTES 128
-#define USART_TX_BYTES 32
+/* The receiver's: what arrives at 250,000 Bd while the planner is at its longest piece of work (4 ms). */
+#define USART_RX_BYTES 112
+#define USART_TX_BYTES 32 /* a power of two: its index wraps by masking */
 
 /* Stands in the receive ring for what was lost: a byte with a framing error, or bytes before an overrun. It is not a
  * character of any command; in binary data a checksum tells it from a genuine 0xFF. */

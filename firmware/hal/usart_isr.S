@@ -6,7 +6,7 @@
 ;
 ;   flag raised to `sei`     18 cycles with interrupts masked (entry 4, vector jump 3, 11 here)
 ;   `cli` to end of `reti`   15 cycles masked
-;   whole run                receive 69 cycles (overrun 91), transmit 67
+;   whole run                receive 71 cycles (overrun 95), transmit 67
 ;
 ; UCSR0B is read, changed and written only while interrupts are masked, here as in usart.c.
 ; Shared: usart.h says who writes which index.
@@ -60,7 +60,9 @@ good:
     lds  r30, usart_rx_head
     mov  r25, r30
     inc  r25
-    andi r25, USART_RX_BYTES - 1
+    cpi  r25, USART_RX_BYTES
+    brne . + 2                  ; over the next instruction
+    ldi  r25, 0
     lds  r31, usart_rx_tail
     cp   r25, r31
     breq full
@@ -76,8 +78,9 @@ received:
 
 ; In a full ring the newest byte becomes USART_DAMAGED: the main loop cannot be reading that one.
 full:
-    dec  r30
-    andi r30, USART_RX_BYTES - 1
+    subi r30, 1
+    brcc . + 2                  ; over the next instruction
+    ldi  r30, USART_RX_BYTES - 1
     ldi  r31, 0
     subi r30, lo8(-(usart_rx_bytes))
     sbci r31, hi8(-(usart_rx_bytes))
@@ -96,7 +99,9 @@ damaged:
     lds  r30, usart_rx_head
     mov  r25, r30
     inc  r25
-    andi r25, USART_RX_BYTES - 1
+    cpi  r25, USART_RX_BYTES
+    brne . + 2                  ; over the next instruction
+    ldi  r25, 0
     lds  r31, usart_rx_tail
     cp   r25, r31
     breq full

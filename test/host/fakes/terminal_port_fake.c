@@ -77,7 +77,7 @@ int16_t terminal_port_get(void)
 
 uint8_t terminal_port_waiting(void)
 {
-    return arriving_slowly ? 0 : typed_count - taken_count > 127 ? 127 : (uint8_t)(typed_count - taken_count);
+    return arriving_slowly ? 0 : typed_count - taken_count > 111 ? 111 : (uint8_t)(typed_count - taken_count);
 }
 
 uint8_t terminal_port_free(void)
