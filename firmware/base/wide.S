@@ -1,6 +1,19 @@
 /* See wide.h. Cycles with call and return: add, subtract 96; multiply about 20 + 45 per zero-free byte of x and 13 per
  * product of two bytes: 420 for a 32-bit x; divide about 140 per byte of x; root 1,200; shift 50 per bit. Little-endian, arguments by the avr-gcc calling convention. */
 
+        .section .text.wide_copy, "ax", @progbits
+        .global wide_copy
+        .type wide_copy, @function
+wide_copy:
+        movw    r30, r24
+        movw    r26, r22
+        ldi     r18, 8
+1:      ld      r19, X+
+        st      Z+, r19
+        dec     r18
+        brne    1b
+        ret
+
         .section .text.wide_add, "ax", @progbits
         .global wide_add
         .type wide_add, @function

@@ -5,11 +5,13 @@
 #ifndef BASE_WIDE_H
 #define BASE_WIDE_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 typedef uint64_t wide_t;
 
 #ifdef __AVR__
+void wide_copy(wide_t *to, const wide_t *from);
 void wide_add(wide_t *sum, const wide_t *x);           /* sum += x */
 void wide_subtract(wide_t *difference, const wide_t *x); /* difference -= x */
 void wide_multiply(wide_t *product, const wide_t *x, const wide_t *y); /* product = x * y, another object than x, y */
@@ -18,6 +20,10 @@ uint32_t wide_root(const wide_t *x);               /* sqrt(x), truncated */
 uint8_t wide_bits(const wide_t *x);                /* of x without its leading zeros: 0..64 */
 void wide_shift(wide_t *x, uint8_t bits);          /* x >>= bits, without sign; bits < 64 */
 #else
+static inline void wide_copy(wide_t *to, const wide_t *from)
+{
+    *to = *from;
+}
 static inline void wide_add(wide_t *sum, const wide_t *x)
 {
     *sum += *x;
@@ -69,6 +75,11 @@ static inline uint32_t wide_half(const wide_t *x, uint8_t half)
     uint32_t bits;
     __builtin_memcpy(&bits, (const uint8_t *)x + 4 * half, sizeof bits);
     return bits;
+}
+
+static inline bool wide_is_negative(const wide_t *x)
+{
+    return ((const uint8_t *)x)[7] >= 0x80;
 }
 
 /* x / 2^(8 * byte), signed, where that fits 32 bits. byte <= 4. */

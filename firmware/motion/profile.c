@@ -51,18 +51,13 @@ static void multiply(wide_t *x, uint32_t factor)
     wide_t wide_factor = factor;
     wide_t product;
     wide_multiply(&product, x, &wide_factor);
-    *x = product;
+    wide_copy(x, &product);
 }
 
 static void square(wide_t *x, uint32_t v)
 {
     wide_t wide_v = v;
     wide_multiply(x, &wide_v, &wide_v);
-}
-
-static bool is_negative(const wide_t *x)
-{
-    return wide_half(x, 1) > INT32_MAX;
 }
 
 /* floor(V^2 / (2 alpha a)) steps from standstill = (100 RPM)^2 * steps_per_rev * pi / 360000 / centi. Up to 500,000
@@ -93,8 +88,8 @@ static void ramp_steps(wide_t *steps, const profile_basis_t *basis, const profil
         wide_t from;
         linear_steps(&from, basis, v_from, centi);
         wide_subtract(&from, steps);
-        *steps = from;
-        if (is_negative(&from)) {
+        wide_copy(steps, &from);
+        if (wide_is_negative(&from)) {
             wide_subtract(steps, &from);
             wide_subtract(steps, &from);
         }
@@ -124,12 +119,12 @@ static void add_change(wide_t *v2, const profile_basis_t *basis, uint32_t pulses
         wide_subtract(v2, &change);
 }
 
-static uint32_t root(const wide_t *x)
+static NOINLINE uint32_t root(const wide_t *x)
 {
-    return is_negative(x) ? 0 : wide_root(x);
+    return wide_is_negative(x) ? 0 : wide_root(x);
 }
 
-static uint32_t limited(const profile_t *profile, uint32_t v)
+static NOINLINE uint32_t limited(const profile_t *profile, uint32_t v)
 {
     uint32_t most = profile->v_peak;
     return (v > most) == profile->faster ? most : v;
@@ -172,10 +167,10 @@ static NOINLINE bool is_steep(const profile_t *profile, const profile_basis_t *b
     wide_t v2;
     square(&v2, profile->v_peak);
     add_change(&v2, basis, pulses + pulses / 50 + 4 * step, profile->decel_centi, false);
-    return !is_negative(&v2);
+    return !wide_is_negative(&v2);
 }
 
-static void begin_plan(profile_t *profile, accel_code_t decel, bool linear, uint32_t v)
+static NOINLINE void begin_plan(profile_t *profile, accel_code_t decel, bool linear, uint32_t v)
 {
     profile->accel_pulses = 0;
     profile->cruise_pulses = 0;

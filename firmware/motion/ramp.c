@@ -8,12 +8,12 @@
 #include <string.h>
 
 /* Shortest group worth planning: the planner's cost per group plus the interrupt's, in cycles = ticks. */
-#define GROUP_MIN_TICKS 600u
+#define GROUP_MIN_TICKS 700u
 #define GROUP_MORE_TICKS 400u /* of several pulses: two reloads ... */
 #define GROUP_PULSE_TICKS 24u /* ... and the count of each */
 #define GROUP_MIN_TICKS_FULL 3000u /* while every interval has to be computed from scratch */
 #define GROUP_MIN_TICKS_LINEAR 1200u
-#define GROUP_MIN_TICKS_LINEAR_FULL 4500u
+#define GROUP_MIN_TICKS_LINEAR_FULL 4000u
 #define GROUP_MAX 128u
 #define STEADY_GROUPS 12u /* until the next review of a group's size */
 #define STEADY_MAX_TICKS 50000u /* their intervals stay below 65536 ticks */
@@ -43,12 +43,12 @@ uint32_t ramp_scale(uint32_t a, uint32_t b, uint32_t divisor)
 static void divide_k(wide_t *quotient, const ramp_constants_t *constants, uint32_t divisor)
 {
     wide_t half = divisor >> 1;
-    *quotient = constants->k512;
+    wide_copy(quotient, &constants->k512);
     wide_add(quotient, &half);
     wide_divide(quotient, divisor);
 }
 
-static uint32_t low_limited(const wide_t *x)
+static NOINLINE uint32_t low_limited(const wide_t *x)
 {
     return wide_bits(x) > 31 ? LONGEST_Q8 : wide_half(x, 0);
 }
@@ -70,7 +70,7 @@ uint32_t ramp_velocity(const ramp_constants_t *constants, uint32_t ticks)
     return ((uint32_t)wide_from_byte(&v512, 1) + 1) >> 1;
 }
 
-NOINLINE static uint32_t magnitude(int32_t x)
+static NOINLINE uint32_t magnitude(int32_t x)
 {
     return x < 0 ? 0u - (uint32_t)x : (uint32_t)x;
 }
@@ -249,16 +249,13 @@ void ramp_begin_harmonic(ramp_t *ramp, const ramp_constants_t *constants, uint32
 
 /* What the sum over a group of k pulses exceeds k times the interval q in its middle by, where s is the law's change
  * over k pulses there: k q (s2 + s4), a power series in r = s / q:
- * s2 = (1 - 1 / k^2) / 12 r^2, s4 = (1 - 1 / k^2) (3 - 7 / k^2) / 240 r^4. */
+ * s2 = (1 - 1 / k^2) / 12 r^2, s4 = (1 - 1 / k^2) (3 - 7 / k^2) / 240 r^4, which is s2 r^2 / 8 or so. */
 static uint32_t excess(uint32_t q, uint32_t s, uint8_t k)
 {
-    uint16_t k2 = (uint16_t)(k * k);
     uint32_t square = ramp_scale(s, s, q);
-    if (square > q >> 10) {
-        uint32_t fourth = ramp_scale(square, square, q);
-        square += (3 * fourth - 7 * fourth / k2) / 20;
-    }
-    return ((square - square / k2) * k + 6) / 12;
+    if (square > q >> 10)
+        square += ramp_scale(square, square, q) >> 3;
+    return ramp_scale(square, (uint16_t)(k * k) - 1u, 12u * k);
 }
 
 /* -- linear ------------------------------------------------------------------------------------------------------ */
@@ -287,8 +284,9 @@ static void add_if(wide_t *sum, const wide_t *x, bool add)
 void ramp_linear_time(wide_t *t_q4, const wide_t *c_q8, uint32_t n, wide_t *rest)
 {
     wide_t wide_n = n;
-    wide_t x = *c_q8;
+    wide_t x;
     wide_t y;
+    wide_copy(&x, c_q8);
     /* The root of n * C / 4^halved, which fits 64 bits. */
     uint8_t bits = (uint8_t)(wide_bits(&x) + wide_bits(&wide_n));
     uint8_t halved = bits > 64 ? (uint8_t)(bits - 63) / 2 : 0;
@@ -304,10 +302,10 @@ void ramp_linear_time(wide_t *t_q4, const wide_t *c_q8, uint32_t n, wide_t *rest
         if (halved == 0)
             return;
         /* What was lost by halving: t += rest / 2t. */
-        bool more = wide_half(rest, 1) <= INT32_MAX;
+        bool more = !wide_is_negative(rest);
         x = 0;
         add_if(&x, rest, more);
-        y = *t_q4;
+        wide_copy(&y, t_q4);
         wide_add(&y, &y);
         bits = wide_bits(&x) > wide_bits(&y) ? wide_bits(&x) : wide_bits(&y);
         bits = bits > 32 ? (uint8_t)(bits - 32) : 0;
@@ -323,8 +321,10 @@ void ramp_linear_time(wide_t *t_q4, const wide_t *c_q8, uint32_t n, wide_t *rest
 /* Duration of a group: |sqrt(t^2 +- group_c) - t|, to a few units. */
 static uint32_t estimate(const ramp_t *ramp)
 {
-    wide_t t = ramp->u.linear.t2_q4;
-    wide_t c = ramp->u.linear.c_q8;
+    wide_t t;
+    wide_t c;
+    wide_copy(&t, &ramp->u.linear.t2_q4);
+    wide_copy(&c, &ramp->u.linear.c_q8);
     uint8_t bits = wide_bits(&t);
     if (bits >= 40) {
         /* Far from standstill: C / 2t; here the group's C may not fit. */
@@ -334,7 +334,7 @@ static uint32_t estimate(const ramp_t *ramp)
         wide_divide(&c, (uint32_t)t);
         return (uint32_t)c * ramp->group;
     }
-    c = ramp->u.linear.group_c;
+    wide_copy(&c, &ramp->u.linear.group_c);
     wide_add(&c, &ramp->u.linear.rest);
     uint8_t halved = bits > 32 ? (uint8_t)(bits - 32) : 0;
     if (wide_bits(&c) > 62)
@@ -344,7 +344,7 @@ static uint32_t estimate(const ramp_t *ramp)
     wide_t square;
     wide_multiply(&square, &t, &t);
     add_if(&square, &c, ramp->faster);
-    if (wide_bits(&square) > 63)
+    if (wide_is_negative(&square))
         square = 0; /* the last group: to standstill exactly */
     return magnitude((int32_t)(wide_root(&square) - (uint32_t)t)) << halved;
 }
@@ -376,7 +376,7 @@ void ramp_bound(ramp_t *ramp, const ramp_constants_t *constants, uint32_t v)
 /* -- both -------------------------------------------------------------------------------------------------------- */
 
 /* Of the last group: mean interval and its change, both 65535 at most. */
-NOINLINE static uint16_t last_ticks(const ramp_t *ramp)
+static NOINLINE uint16_t last_ticks(const ramp_t *ramp)
 {
     uint32_t ticks = ramp->u.harmonic.q8 >> 8;
     if (ramp->linear)
@@ -384,7 +384,7 @@ NOINLINE static uint16_t last_ticks(const ramp_t *ramp)
     return ticks > UINT16_MAX ? UINT16_MAX : (uint16_t)ticks;
 }
 
-static uint16_t last_slope_q8(const ramp_t *ramp)
+static NOINLINE uint16_t last_slope_q8(const ramp_t *ramp)
 {
     uint32_t slope_q8 = magnitude(ramp->u.harmonic.slope);
     if (slope_q8 > 0xFFF)
@@ -461,7 +461,7 @@ static bool begin_group(ramp_t *ramp, uint32_t left)
 }
 
 /* After a value from scratch: slope and curve from the ones before. */
-NOINLINE static void follow(ramp_t *ramp, uint32_t q_before, int32_t slope_before)
+static NOINLINE void follow(ramp_t *ramp, uint32_t q_before, int32_t slope_before)
 {
     uint32_t slope = ramp->u.harmonic.q8 - q_before;
     ramp->u.harmonic.slope = (int32_t)slope;
@@ -490,7 +490,8 @@ static void harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, bool 
         ramp->u.harmonic.next2 = next2 + spacing2;
         if (ramp->capped)
             mid2 = ramp->u.harmonic.cap2;
-        wide_t q8 = constants->k512;
+        wide_t q8;
+        wide_copy(&q8, &constants->k512);
         uint32_t rest = wide_divide(&q8, mid2);
         ramp->u.harmonic.q8 = low_limited(&q8);
         if (ramp->u.harmonic.q8 == LONGEST_Q8) {
