@@ -91,6 +91,7 @@ CHECK(NEXT2, u.harmonic.next2);
 CHECK(SPACING2, u.harmonic.spacing2);
 CHECK(MID2, u.harmonic.mid2);
 CHECK(K512, u.harmonic.k512);
+CHECK(CARRY, u.harmonic.carry);
 CHECK(Q8, u.linear.sum_q4);
 CHECK(SLOPE, u.linear.slope);
 CHECK(CURVE, u.linear.curve);
@@ -147,7 +148,7 @@ uint32_t ramp_step(ramp_t *ramp)
         }
         q += correction;
         sum = q;
-        for (uint8_t bits = (uint8_t)(ramp->group_log2 + 1); bits; bits--) {
+        for (uint8_t bits = ramp->group_log2; bits; bits--) {
             sum <<= 1;
             rest <<= 1;
             if (rest >= mid2) {
@@ -155,7 +156,12 @@ uint32_t ramp_step(ramp_t *ramp)
                 sum++;
             }
         }
-        sum = (sum + 1) >> 1;
+        rest += ramp->u.harmonic.carry;
+        if (rest >= mid2) {
+            rest -= mid2;
+            sum++;
+        }
+        ramp->u.harmonic.carry = rest;
     }
     ramp->u.harmonic.q8 = q;
     ramp->u.harmonic.slope = (int32_t)(slope + correction);
@@ -252,10 +258,10 @@ void ramp_begin_harmonic(ramp_t *ramp, const ramp_constants_t *constants, uint32
  * s2 = (1 - 1 / k^2) / 12 r^2, s4 = (1 - 1 / k^2) (3 - 7 / k^2) / 240 r^4, which is s2 r^2 / 8 or so. */
 static uint32_t excess(uint32_t q, uint32_t s, uint8_t k)
 {
-    uint32_t square = ramp_scale(s, s, q);
-    if (square > q >> 10)
-        square += ramp_scale(square, square, q) >> 3;
-    return ramp_scale(square, (uint16_t)(k * k) - 1u, 12u * k);
+    uint32_t square = ramp_scale(s << 4, s, q); /* sixteenths */
+    if (square > q >> 6)
+        square += ramp_scale(square, square, q) >> 7;
+    return ramp_scale(square, (uint16_t)(k * k) - 1u, 192u * k);
 }
 
 /* -- linear ------------------------------------------------------------------------------------------------------ */
@@ -389,7 +395,7 @@ static NOINLINE uint16_t last_slope_q8(const ramp_t *ramp)
     uint32_t slope_q8 = magnitude(ramp->u.harmonic.slope);
     if (slope_q8 > 0xFFF)
         return UINT16_MAX;
-    return ramp->linear ? (uint16_t)(slope_q8 << 4) >> ramp->group_log2 : (uint16_t)slope_q8;
+    return (uint16_t)(ramp->linear ? slope_q8 << 4 >> ramp->group_log2 : slope_q8);
 }
 
 /* Sets the group that comes next; false if it can be carried on from the last. */
@@ -504,10 +510,16 @@ static void harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, bool 
         ramp->u.harmonic.mid2 = mid2;
         follow(ramp, q_before, ramp->u.harmonic.slope);
         total = ramp->u.harmonic.q8 * group;
-        if (group > 1)
+        if (group > 1) {
             total += ramp_scale(rest, group, mid2);
-        else if (rest > mid2 >> 1)
-            total++;
+        } else {
+            rest += ramp->u.harmonic.carry;
+            if (rest >= mid2) {
+                rest -= mid2;
+                total++;
+            }
+            ramp->u.harmonic.carry = rest;
+        }
         s = 0;
         if (ramp->capped)
             ramp->seen = 0;

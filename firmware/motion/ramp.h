@@ -51,7 +51,8 @@ typedef struct {
             uint32_t step;     /* change of velocity per pulse */
             uint32_t spacing2; /* change of mid2 from group to group, modulo 2^32 */
             uint32_t mid2;     /* twice the velocity in the middle of the last group */
-            uint32_t k512;     /* modulo 2^32: k512 - q8 * mid2, at most half of mid2, is the exact remainder */
+            uint32_t k512;     /* modulo 2^32: k512 - q8 * mid2, below mid2, is the exact remainder */
+            uint32_t carry;    /* of such remainders, below mid2 */
         } harmonic;
         struct {
             uint32_t sum_q4; /* duration of the last group */

@@ -13,6 +13,7 @@
 #define RAMP_SPACING2 40
 #define RAMP_MID2 44
 #define RAMP_K512 48
+#define RAMP_CARRY 52
 #define RAMP_T2 28
 #define RAMP_REST 36
 #define RAMP_GROUP_C 44

@@ -4,7 +4,7 @@
  *   slope += curve;  q += slope
  *   harmonic: mid2 += spacing2;  next2 += spacing2;  rest = k512 - q * mid2;
  *             while rest is not in 0..mid2 - 1: rest -+= mid2, one correction;
- *             return (q + rest / mid2) << group_log2, rounded
+ *             return (q + rest / mid2) << group_log2, truncated; the rest of that is carried on
  *   linear:   t2 +-= q;  rest += group_c - q * t2;  t2 +-= q;
  *             while rest is not in 0..t2 - 1: t2 +-= 1, rest -+= t2, t2 +-= 1, one correction;  return q << 4
  *   q, slope and curve += corrections
@@ -127,10 +127,11 @@ harmonic:
         sbc     r15, r21
         rjmp    2b
 3:      rcall   correct
-        /* One bit more than the group's pulses have, from the rest; then rounded. */
+        /* The bits that the group's pulses have, from the rest; what is left after that is carried on. */
         ldd     r17, Z + 4 + RAMP_GROUP_LOG2
-        inc     r17
-4:      lsl     r22
+4:      subi    r17, 1
+        brcs    5f
+        lsl     r22
         rol     r23
         rol     r24
         rol     r25
@@ -142,22 +143,32 @@ harmonic:
         cpc     r13, r19
         cpc     r14, r20
         cpc     r15, r21
-        brlo    5f
+        brlo    4b
         sub     r12, r18
         sbc     r13, r19
         sbc     r14, r20
         sbc     r15, r21
         inc     r22
-5:      dec     r17
-        brne    4b
-        subi    r22, 0xFF
+        rjmp    4b
+5:      load4   r26, r27, r16, r17, RAMP_CARRY + 4
+        add     r26, r12
+        adc     r27, r13
+        adc     r16, r14
+        adc     r17, r15
+        cp      r26, r18
+        cpc     r27, r19
+        cpc     r16, r20
+        cpc     r17, r21
+        brlo    6f
+        sub     r26, r18
+        sbc     r27, r19
+        sbc     r16, r20
+        sbc     r17, r21
+        subi    r22, 0xFF               /* += 1 */
         sbci    r23, 0xFF
         sbci    r24, 0xFF
         sbci    r25, 0xFF
-        lsr     r25
-        ror     r24
-        ror     r23
-        ror     r22
+6:      store4  r26, r27, r16, r17, RAMP_CARRY + 4
         rjmp    leave
 shift:  subi    r18, 1
         brcs    leave
