@@ -867,13 +867,14 @@ bool engine_poll(void)
     }
     if (next_taken && playing && !single && (stage == STAGE_GAP || stage == STAGE_END || stage == STAGE_REST))
         join_next();
-    /* Until the ring is half full nothing else is as urgent; then a step at a time. */
+    /* Until the ring is half full nothing else is as urgent, within reason; then a step at a time. */
+    uint8_t rounds = 6;
     if (playing) {
         do {
             if (ring_free() < RING_RESERVE || !emit())
                 break;
             worked = true;
-        } while (ring_free() > SEGMENT_COUNT / 2);
+        } while (ring_free() > SEGMENT_COUNT / 2 && --rounds);
     }
     return worked;
 }

@@ -511,15 +511,16 @@ static void harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, bool 
         follow(ramp, q_before, ramp->u.harmonic.slope);
         total = ramp->u.harmonic.q8 * group;
         if (group > 1) {
-            total += ramp_scale(rest, group, mid2);
-        } else {
-            rest += ramp->u.harmonic.carry;
-            if (rest >= mid2) {
-                rest -= mid2;
-                total++;
-            }
-            ramp->u.harmonic.carry = rest;
+            uint32_t whole = ramp_scale(rest, group, mid2);
+            total += whole;
+            rest = rest * group - whole * mid2;
         }
+        rest += ramp->u.harmonic.carry;
+        if (rest >= mid2) {
+            rest -= mid2;
+            total++;
+        }
+        ramp->u.harmonic.carry = rest;
         s = 0;
         if (ramp->capped)
             ramp->seen = 0;

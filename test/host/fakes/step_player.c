@@ -182,7 +182,7 @@ static void interrupt(void)
     if (step_head == step_tail) {
         ring_empty();
     } else if (step_flags & EARLY) {
-        p.waiting = (step_flags & EARLY) >> SEGMENT_EARLY_SHIFT;
+        p.waiting = (uint8_t)((step_flags & EARLY) >> SEGMENT_EARLY_SHIFT);
         p.waits_from = p.begin + STEP_PLAYER_WAITS_AFTER;
     } else {
         load(step_player_load_ticks);
@@ -207,8 +207,10 @@ static void bottom(void)
         p.next_top = p.late_top;
         p.next_match = p.late_match;
     }
-    if (!p.counting)
+    if (!p.counting) {
+        p.over = true; /* the flag that nobody serves */
         return;
+    }
     if (p.held) {
         p.harm.lost_counts += p.over;
         p.over = true;
@@ -232,7 +234,7 @@ static void rise(uint64_t until)
 static void pass_many(uint64_t until)
 {
     uint64_t period = p.top + 1u;
-    if (p.next_top != p.top || p.next_match != p.match || p.held || p.over || p.late_write || until < period_end())
+    if (p.next_top != p.top || p.next_match != p.match || p.held || (p.over && p.counting) || p.late_write || until < period_end())
         return;
     uint64_t periods = (until - p.begin) / period;
     if (p.counting) {
@@ -246,6 +248,7 @@ static void pass_many(uint64_t until)
     }
     if (periods == 0)
         return;
+    p.over = p.over || !p.counting;
     if (p.match < p.top) {
         uint64_t skip = p.risen;
         if (periods > skip)
@@ -324,7 +327,7 @@ bool step_player_stopped(void)
 void step_player_hold_interrupt(bool hold)
 {
     p.held = hold;
-    if (!hold && p.over) {
+    if (!hold && p.over && p.counting) {
         p.over = false;
         interrupt();
         run_to(p.blocked_until > p.now ? p.blocked_until : p.now);
@@ -563,14 +566,4 @@ uint16_t step_port_shorten(uint8_t offset, uint16_t periods)
         p.to_count = periods;
     }
     return (uint16_t)dropped;
-}
-
-uint8_t step_port_lock(void)
-{
-    return 0;
-}
-
-void step_port_unlock(uint8_t state)
-{
-    (void)state;
 }
