@@ -1,5 +1,6 @@
 /* See wide.h. Cycles with call and return: add, subtract 96; multiply about 20 + 45 per zero-free byte of x and 13 per
- * product of two bytes: 420 for a 32-bit x; divide about 140 per byte of x; root 1,200; shift 50 per bit. Little-endian, arguments by the avr-gcc calling convention. */
+ * product of two bytes: 420 for a 32-bit x; divide about 140 per byte of x; root 1,200; shift 70
+ * per bit; copy 80. Little-endian, arguments by the avr-gcc calling convention. */
 
         .section .text.wide_copy, "ax", @progbits
         .global wide_copy

@@ -50,7 +50,7 @@ static void multiply(wide_t *x, uint32_t factor)
 {
     wide_t wide_factor = factor;
     wide_t product;
-    wide_multiply(&product, x, &wide_factor);
+    wide_multiply(&product, &wide_factor, x); /* the shorter one first: faster */
     wide_copy(x, &product);
 }
 
@@ -239,7 +239,10 @@ void profile_plan(profile_t *profile, const profile_basis_t *basis, const motion
     wide_t accel;
     wide_t decel;
     ramp_steps(&accel, basis, profile, v_in, profile->accel_centi);
-    ramp_steps(&decel, basis, profile, basis->v_slow, profile->decel_centi);
+    if (v_in == basis->v_slow && profile->decel_centi == profile->accel_centi)
+        wide_copy(&decel, &accel); /* saves half of the planning */
+    else
+        ramp_steps(&decel, basis, profile, basis->v_slow, profile->decel_centi);
     /* Full steps are truncated as full steps, so that a ramp covers the same steps whatever the factor. */
     uint8_t doublings = factor_log2;
     if (command->flags & MOTION_PULSES) {
@@ -262,7 +265,8 @@ void profile_plan(profile_t *profile, const profile_basis_t *basis, const motion
     /* The velocity that stays. */
     if (profile->decel_pulses != 0) {
         profile->v_exit = basis->v_slow;
-        profile->steep_decel = is_steep(profile, basis);
+        if (profile->cruise_pulses == 0)
+            profile->steep_decel = is_steep(profile, basis);
     } else if (profile->cruise_pulses != 0) {
         profile->v_exit = v_target;
         profile->exit_cycle_us = cycle_us;

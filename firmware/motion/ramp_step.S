@@ -1,5 +1,5 @@
-/* ramp_step() of ramp.h for the AVR: a ramp's steady state, with call and return about 300 cycles and 20 for each bit
- * of group_log2 (harmonic) or 600 cycles (linear), and 15 or 60 more for each correction.
+/* ramp_step() of ramp.h for the AVR: a ramp's steady state, with call and return about 310 cycles and 20 for each bit
+ * of group_log2 (harmonic) or 550 to 650 cycles (linear), and 15 or 60 more for each correction.
  *
  *   slope += curve;  q += slope
  *   harmonic: mid2 += spacing2;  next2 += spacing2;  rest = k512 - q * mid2;
