@@ -126,7 +126,8 @@ class Walker:
         if target is not None:
             return [target]
         caller = self.image.name(address)
-        patterns = self.indirect.get(caller)
+        # The compiler names its own copies of a function name.constprop.1, name.part.2 and so on.
+        patterns = self.indirect.get(caller) or self.indirect.get(caller.split(".")[0])
         if not patterns:
             raise Unbounded(f"{caller} calls through a pointer at {address:#x}: list what it reaches")
         names = {n for _, n in self.image.symbols if any(fnmatch.fnmatchcase(n, p) for p in patterns)}
