@@ -44,6 +44,10 @@
 #define SETTINGS_FULL_STEP 1
 #endif
 
+/* Not to be taken for constants: they are written from outside (by the tests' board, and from EEPROM in time). */
+#ifdef __AVR__
+__attribute__((used, externally_visible))
+#endif
 settings_t settings = {
     .cycle_us = SETTINGS_CYCLE_US,
     .hw_baud = SETTINGS_HW_BAUD,

@@ -142,37 +142,26 @@ void step_port_halt(void)
     TIFR1 = 1 << TOV1;
 }
 
+void step_port_finish(void)
+{
+    while (!step_idle || !(TIFR1 & 1 << TOV1))
+        ;
+}
+
 bool step_port_arm(uint8_t offset, uint16_t top, uint16_t match, uint8_t flags)
 {
     segment_t *s = segment_at(offset);
     uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
-    uint16_t too_late = segment_at((uint8_t)(offset - SEGMENT_BYTES))->top;
-    too_late = too_late > 64 ? (uint16_t)(too_late - 64) : 0;
-    bool done = false;
-
     uint8_t state = atomic_begin();
     uint8_t distance = (uint8_t)(after - step_tail);
-    if (distance != 0 && distance <= (uint8_t)(step_head - step_tail)) {
+    bool done = distance != 0 && distance <= (uint8_t)(step_head - step_tail);
+    if (done) {
         s->top = top;
         s->match = match;
         s->flags = flags;
         step_head = after;
-        done = true;
-    } else if (distance == 0 && GPIOR0 == 1 && !(TIFR1 & 1 << TOV1) && TCNT1 < too_late) {
-        /* Loaded, not begun: the buffers can still be written. */
-        OCR1A = top;
-        OCR1B = match;
-        step_flags = flags;
-        step_head = after;
-        done = true;
     }
     atomic_end(state);
-    if (done) {
-        /* For the position; the interrupt reads a segment only once. */
-        s->top = top;
-        s->match = match;
-        s->flags = flags;
-    }
     return done;
 }
 

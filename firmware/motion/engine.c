@@ -10,6 +10,7 @@
 #define TICKS_PER_US 16u
 #define DIR_SETUP_TICKS 80u      /* dir before the first pulse: 5 us, the slowest common drivers ask for it */
 #define TURN_TICKS (DIR_SETUP_TICKS + 100u) /* the same where the step interrupt sets dir: its latency and cycles */
+#define BODY_TICKS 2048u         /* periods of the closing interval before its tail */
 #define TAIL_TICKS 320u          /* the end of the closing interval, on which a following command is joined */
 #define SHORTEST_PIECE_TICKS 128u
 #define SILENCE_MAX_PERIODS 65000u
@@ -18,10 +19,12 @@
 #define AHEAD_SHORT_TICKS 6144u  /* and one without acceleration */
 #define AHEAD_PERIODS 12u        /* they last; when the last one begins, the next segment must be there */
 #define CUT_KEEP_TICKS 32768u    /* motion left to run while a deceleration is planned */
-#define CRUISE_GROUP_TICKS 1600u /* shortest run of a cruise whose interval has a fraction */
-#define JOIN_TICKS 12000u         /* before the tail: to plan a command and emit its first intervals */
+#define CRUISE_GROUP_TICKS 4096u /* shortest run of a cruise whose interval has a fraction */
+#define JOIN_TICKS 7000u          /* before the tail: to plan a command and emit its first intervals */
+#define JOIN_LINEAR_TICKS 16000u  /* the same for a linear one */
 #define JOIN_SOON_TICKS 160000u   /* before the tail: when that is done at the earliest */
 #define START_TICKS 8000u        /* in the ring before the timer runs */
+#define RING_LOW 18u             /* free segments: the planner has become slower than the motor */
 #define RING_RESERVE 4u          /* segments that one step of emission may need */
 #define STEADY_MOST_GROUPS 12u /* emitted in the short way at a time (ramp.c) */
 #define UNSPLIT_BELOW_TICKS 128u
@@ -159,7 +162,7 @@ static uint32_t profile_pulses_left(void)
 static uint8_t pulses_to_come(void)
 {
     uint32_t left = profile_pulses_left();
-    return left > 255 ? 254 : left > 1 ? (uint8_t)(left - 1) : 0;
+    return left > 255 ? 254 : left ? (uint8_t)(left - 1) : 0;
 }
 
 static void add_pulses(uint8_t flags, uint16_t pulses)
@@ -437,6 +440,13 @@ static void begin_ramp(motion_state_t state)
 static void emit_ramp(uint32_t *left, uint32_t at_most, motion_state_t state, bool faster)
 {
     begin_ramp(state);
+    if (ring_free() > RING_LOW) {
+        if (!ramp.hurry)
+            ramp.steady = 0;
+        ramp.hurry = true;
+    } else if (ring_free() < RING_LOW / 2) {
+        ramp.hurry = false;
+    }
     /* Enough left that held pulses can be given back, and periods that need no early reload. */
     if (ramp.steady && at_most >= 2u * ramp.group && profile_pulses_left() > STEADY_MOST_GROUPS * ramp.group && !step_held &&
         !tail_awaited && !dir_due && !owed && carry_q8 >= 0) {
@@ -526,7 +536,14 @@ static void begin_closing(void)
             ticks += PROFILE_CHUNK_TICKS;
             chunks--;
         }
-        set_interval(chunks, ticks - TAIL_TICKS, false);
+        ticks -= TAIL_TICKS;
+        if (ticks >= 2 * BODY_TICKS && !ahead_ticks) {
+            /* In short periods, so that the tail is loaded late and can be joined until then. */
+            uint8_t periods = (uint8_t)(ticks / BODY_TICKS - 1);
+            push(periods, BODY_TICKS - 1, false, state);
+            ticks -= periods * (uint32_t)BODY_TICKS;
+        }
+        set_interval(chunks, ticks, false);
     }
 }
 
@@ -571,8 +588,6 @@ static bool emit(void)
         uint32_t us = command.start_wait_us;
         uint32_t chunks = us >> (PROFILE_CHUNK_LOG2 - 4);
         uint32_t ticks = (us & (PROFILE_CHUNK_TICKS / TICKS_PER_US - 1)) * TICKS_PER_US;
-        if (chunks == 0 && ticks < DIR_SETUP_TICKS + pulse_width_ticks())
-            ticks = DIR_SETUP_TICKS + pulse_width_ticks();
         ramp_state = MOTION_STANDBY;
         set_interval(chunks, ticks, true);
         stage = STAGE_RUN;
@@ -757,15 +772,27 @@ static uint32_t ticks_to_tail(void)
     return ticks;
 }
 
+/* Has the segment after the tail begun? (An idle timer is dealt with by engine_poll.) */
+static bool tail_is_over(void)
+{
+    step_snapshot_t at = step_port_snapshot();
+    uint8_t loaded = (uint8_t)(at.tail - SEGMENT_BYTES);
+    if (step_idle || !has_begun(tail_offset))
+        return false;
+    return loaded != (uint8_t)(tail_offset + SEGMENT_BYTES) || at.to_count != counted_periods(segment_at(loaded));
+}
+
 /* Lets the command in `next` follow the one that has been emitted: exactly one interval after its last pulse where there
  * is time to plan it and to emit its first intervals, otherwise as soon as possible after its end. Not long before, so
  * that the running command can still be cut without the next one. */
 static void join_next(void)
 {
     uint32_t ticks = ticks_to_tail();
-    bool timely = ticks >= JOIN_TICKS;
-    if (ticks > JOIN_SOON_TICKS || (!timely && tail_awaited))
-        return; /* later; at its end */
+    bool timely = ticks >= (next.flags & MOTION_LINEAR ? JOIN_LINEAR_TICKS : JOIN_TICKS);
+    if (ticks > JOIN_SOON_TICKS)
+        return; /* later */
+    if (!timely && !tail_is_over())
+        return; /* at its end */
     bool turns = is_ccw(&next) != is_ccw(&command);
     uint32_t wait = wait_ticks(next.start_wait_us);
     command = next;
@@ -780,8 +807,7 @@ static void join_next(void)
         return;
     }
     /* Longer than the gap the wait means a start from slow speed. */
-    if (wait >= SHORTEST_PIECE_TICKS && closing_chunks < 0x10000u &&
-        wait > (closing_chunks << PROFILE_CHUNK_LOG2) + closing_ticks)
+    if (wait >> PROFILE_CHUNK_LOG2 >= closing_chunks && wait > (closing_chunks << PROFILE_CHUNK_LOG2) + closing_ticks)
         expire_gap();
     plan();
     joined_offset = tail_offset;
@@ -1020,8 +1046,7 @@ void engine_next_graceful(void)
 void engine_single_pulse(bool ccw)
 {
     if (single) {
-        while (!step_idle || !step_port_snapshot().period_over)
-            ;
+        step_port_finish();
     } else if (running() || next_taken) {
         return;
     }

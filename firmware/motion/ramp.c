@@ -422,13 +422,16 @@ static bool begin_group(ramp_t *ramp, uint32_t left)
         from_scratch = change * wish > (speed >> 5) + (ticks < 4096 ? speed >> 4 : 0);
         min_ticks = GROUP_MIN_TICKS;
     }
+    if (from_scratch)
+        min_ticks = linear ? GROUP_MIN_TICKS_LINEAR_FULL : GROUP_MIN_TICKS_FULL;
     if (ramp->seen < SEEN_ENOUGH) {
+        /* Only the first few: what they take longer the ring has in store. */
         from_scratch = true;
         if (ramp->seen < 2)
             slope_q8 = SLOPE_KEEPS_Q8; /* not known */
     }
-    if (from_scratch)
-        min_ticks = linear ? GROUP_MIN_TICKS_LINEAR_FULL : GROUP_MIN_TICKS_FULL;
+    if (ramp->hurry)
+        min_ticks = (uint16_t)(min_ticks * 2);
     wish = choose_group(wish, ticks, slope_q8, min_ticks);
     /* A power of two while there is enough left; the last group takes what remains. */
     uint8_t group = left >> 1 < wish ? (uint8_t)left : wish;

@@ -64,6 +64,7 @@ typedef struct {
             wide_t c_q8;     /* C */
         } linear;
     } u;
+    bool hurry; /* set by the caller: groups shall last twice as long, there is other work to be done */
 } ramp_t;
 
 /* steps_per_rev >= 8 */

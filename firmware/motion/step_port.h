@@ -21,6 +21,9 @@ void step_port_start(void);
  * the return; step_port_snapshot() then tells where it stopped. */
 void step_port_halt(void);
 
+/* Waits until all of the ring has been played: for a few microseconds of pulses only. */
+void step_port_finish(void);
+
 /* Where the step interrupt is, read in one atomic section. */
 typedef struct {
     uint8_t tail;         /* step_tail */
@@ -31,7 +34,7 @@ typedef struct {
 step_snapshot_t step_port_snapshot(void);
 
 /* Turns the silent one-period segment at `offset`, the last but for silence, into one that ends with a pulse, and drops
- * what follows it in the ring. False if it has begun, or is about to: nothing is changed then. */
+ * what follows it in the ring. False if it has been loaded already: nothing is changed then. */
 bool step_port_arm(uint8_t offset, uint16_t top, uint16_t match, uint8_t flags);
 
 /* Adds one period to the segment at `offset` and drops what follows it. False if its end is too near. */

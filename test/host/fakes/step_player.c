@@ -496,6 +496,12 @@ static int whereabouts(uint8_t after)
     return distance <= (uint8_t)(step_head - step_tail) ? 1 : -1;
 }
 
+void step_port_finish(void)
+{
+    while (p.clocked && !(step_idle && p.over))
+        run_to(period_end());
+}
+
 bool step_port_arm(uint8_t offset, uint16_t top, uint16_t match, uint8_t flags)
 {
     segment_t *s = &segments[offset / SEGMENT_BYTES];
