@@ -10,7 +10,6 @@
 #define TICKS_PER_US 16u
 #define DIR_SETUP_TICKS 80u      /* dir before the first pulse: 5 us, the slowest common drivers ask for it */
 #define TURN_TICKS (DIR_SETUP_TICKS + 100u) /* the same where the step interrupt sets dir: its latency and cycles */
-#define BODY_TICKS 2048u         /* periods of the closing interval before its tail */
 #define TAIL_TICKS 320u          /* the end of the closing interval, on which a following command is joined */
 #define SHORTEST_PIECE_TICKS 128u
 #define SILENCE_MAX_PERIODS 65000u
@@ -537,12 +536,6 @@ static void begin_closing(void)
             chunks--;
         }
         ticks -= TAIL_TICKS;
-        if (ticks >= 2 * BODY_TICKS && !ahead_ticks) {
-            /* In short periods, so that the tail is loaded late and can be joined until then. */
-            uint8_t periods = (uint8_t)(ticks / BODY_TICKS - 1);
-            push(periods, BODY_TICKS - 1, false, state);
-            ticks -= periods * (uint32_t)BODY_TICKS;
-        }
         set_interval(chunks, ticks, false);
     }
 }
