@@ -3,9 +3,10 @@
  * Cycles, interrupt entry (4) and the jump in the vector table (3) included:
  *   period counted                      23
  *   period counted, low byte wrapped    30
- *   segment loaded                      86, with a change of dir 95 (measured: make bench)
- *   segment loaded one or two periods early: the same plus the wait, at most 160
- *   ring empty                          about 60
+ *   segment loaded                      92, with a change of dir 103
+ *   segment loaded one to three periods early, waits included: at most 160
+ *   ring empty                          86
+ * (measured: make bench BENCH=isr)
  *
  * It is the only interrupt that is never interrupted: SREG rests in GPIOR2, the counter in GPIOR0 (low) and GPIOR1.
  * The registers written here are double-buffered: they take effect when the running period ends (datasheet section

@@ -221,8 +221,8 @@ static uint16_t absorb_held(void)
     return held;
 }
 
-/* Appends `periods` periods of `top` + 1 ticks. Runs too short to be reloaded in time (less than 96 ticks a period and
- * hardly more periods than are waited for) are stretched: their count stays exact. */
+/* Appends `periods` periods of `top` + 1 ticks. Runs too short to be reloaded in time (periods that need an early reload,
+ * no more of them than are waited for) are stretched: their count stays exact. */
 static void push(uint16_t periods, uint16_t top, bool pulse, motion_state_t state)
 {
     segment_t *s = segment_at(step_head);

@@ -29,7 +29,7 @@
 #define SEGMENT_SILENT 0xFFFF /* match value that is never reached */
 
 /* Periods below these are not reloaded within themselves but one, two or three periods early: interrupt latency (28)
- * plus the cycles from the flag to the last register (52), with room. docs/design.md */
+ * plus the cycles from the flag to the last register (53), with room. docs/design.md */
 #define SEGMENT_EARLY1_BELOW_TICKS 84
 #define SEGMENT_EARLY2_BELOW_TICKS 48
 #define SEGMENT_EARLY3_BELOW_TICKS 40
@@ -42,8 +42,8 @@ typedef struct {
     uint16_t match;      /* OCR1B: top - pulse width, or SEGMENT_SILENT */
     uint8_t count_low;   /* periods to count: low 1..256 (0 = 256) ... */
     uint8_t count_high;  /* ... plus 256 times this */
-    uint8_t flags;
-    uint8_t unused;
+    uint8_t flags;       /* SEGMENT_* above */
+    uint8_t unused;      /* 8 bytes a segment: an offset wraps by itself */
 } segment_t;
 
 extern segment_t segments[SEGMENT_COUNT];
