@@ -1,5 +1,5 @@
 /* See wide.h. Cycles with call and return: add, subtract 96; multiply about 20 + 45 per zero-free byte of x and 13 per
- * product of two bytes: 420 for a 32-bit x; divide about 140 per byte of x; root 1,200; shift 70
+ * product of two bytes: 420 for a 32-bit x; divide about 140 per byte of the quotient; root 1,200; shift 70
  * per bit; copy 80. Little-endian, arguments by the avr-gcc calling convention. */
 
         .section .text.wide_copy, "ax", @progbits
@@ -105,13 +105,20 @@ wide_divide:                    /* r24 x, r20-r23 divisor; returns the remainder
         clr     r25
         ldi     r19, 8          /* bytes */
 1:      ld      r18, -Z
-        mov     r0, r22         /* nothing there yet: the quotient has a zero */
-        or      r0, r23
-        or      r0, r24
-        or      r0, r25
-        or      r0, r18
-        breq    5f
-        ldi     r18, 8
+        tst     r25
+        brne    6f
+        cp      r18, r20        /* with the next byte the remainder is still less: the quotient has a zero */
+        cpc     r22, r21
+        cpc     r23, r26
+        cpc     r24, r27
+        brsh    6f
+        mov     r25, r24
+        mov     r24, r23
+        mov     r23, r22
+        mov     r22, r18
+        st      Z, r1
+        rjmp    5f
+6:      ldi     r18, 8
         mov     r0, r18
         ld      r18, Z
 2:      lsl     r18
