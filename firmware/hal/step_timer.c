@@ -17,6 +17,11 @@
 /* Ticks between reading TCNT1 and the timer standing still, and a margin. */
 #define FREEZE_TICKS 16
 
+/* Ticks between reading TCNT1 and the last of the buffers written, and a margin. */
+#define ARM_TICKS 64
+/* Where periods are short there is no time to look at all this with interrupts off. */
+#define ARM_LEAST_TICKS 256
+
 /* The ring is one page of RAM (motion/segment.h): an offset is the low byte of the address. */
 static inline segment_t *segment_at(uint8_t offset)
 {
@@ -102,6 +107,14 @@ step_snapshot_t step_port_snapshot(void)
     return at;
 }
 
+uint16_t step_port_counter(void)
+{
+    uint8_t state = atomic_begin();
+    uint16_t counter = TCNT1;
+    atomic_end(state);
+    return counter;
+}
+
 void step_port_halt(void)
 {
     /* Until nobody counts: stopped, or playing uncounted silence. That may happen in here as well. */
@@ -151,10 +164,18 @@ void step_port_finish(void)
 bool step_port_arm(uint8_t offset, uint16_t top, uint16_t match, uint8_t flags)
 {
     segment_t *s = segment_at(offset);
+    uint16_t before_top = segment_at((uint8_t)(offset - SEGMENT_BYTES))->top;
     uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
     uint8_t state = atomic_begin();
     uint8_t distance = (uint8_t)(after - step_tail);
     bool done = distance != 0 && distance <= (uint8_t)(step_head - step_tail);
+    if (before_top >= ARM_LEAST_TICKS && distance == 0 && !step_idle && !(TIFR1 & 1 << TOV1) &&
+        (uint16_t)(TCNT1 + ARM_TICKS) < before_top) {
+        /* Loaded, but the period before it is still running: into the buffers. */
+        set_compare(top, match);
+        step_flags = flags;
+        done = true;
+    }
     if (done) {
         s->top = top;
         s->match = match;

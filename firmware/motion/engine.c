@@ -1,6 +1,8 @@
 /* See engine.h; why it is built this way: docs/design.md. */
 #include "motion/engine.h"
 #include "base/atomic.h"
+#include "base/inline.h"
+#include "motion/block.h"
 #include "motion/profile.h"
 #include "motion/ramp.h"
 #include "motion/segment.h"
@@ -15,18 +17,19 @@
 #define SILENCE_MAX_PERIODS 65000u
 #define AHEAD_TICKS 24576u       /* silence begun before a profile with ramps is planned: 1.5 ms */
 #define AHEAD_LONG_TICKS 49152u  /* twice that, where possible */
-#define AHEAD_SHORT_TICKS 6144u  /* and one without acceleration */
+#define AHEAD_SHORT_TICKS 12000u /* and one without ramps */
 #define AHEAD_PERIODS 12u        /* they last; when the last one begins, the next segment must be there */
 #define CUT_KEEP_TICKS 32768u    /* motion left to run while a deceleration is planned */
 #define CRUISE_GROUP_TICKS 4096u /* shortest run of a cruise whose interval has a fraction */
-#define JOIN_TICKS 7000u          /* before the tail: to plan a command and emit its first intervals */
-#define JOIN_LINEAR_TICKS 16000u  /* the same for a linear one */
+#define JOIN_TICKS 10000u         /* before the tail: to plan a command and emit its first intervals */
+#define JOIN_LINEAR_TICKS 40000u  /* the same for a linear one */
+#define JOIN_FLAT_TICKS 2500u     /* and for one without ramps */
 #define JOIN_SOON_TICKS 160000u   /* before the tail: when that is done at the earliest */
-#define START_TICKS 8000u        /* in the ring before the timer runs */
-#define RING_LOW 18u             /* free segments: the planner has become slower than the motor */
+#define START_TICKS 12000u       /* in the ring before the timer runs */
+#define START_PERIODS 4u         /* and at least so many: a segment is loaded when the one before it begins */
+#define REST_PULSES 64u          /* the least that is left for a fast ramp's last run */
+#define RING_REFILL 12u          /* free segments for a block to be gone on with */
 #define RING_RESERVE 4u          /* segments that one step of emission may need */
-#define STEADY_MOST_GROUPS 12u /* emitted in the short way at a time (ramp.c) */
-#define UNSPLIT_BELOW_TICKS 128u
 
 /* What comes next of the command being emitted. */
 typedef enum {
@@ -47,12 +50,13 @@ static bool playing; /* the timer runs (it may play silence) */
 static stage_t stage;
 static ramp_t ramp;
 static motion_state_t ramp_state; /* the phase that `ramp` was begun for; MOTION_STANDBY: none */
+static block_t block;             /* of that phase, while it has runs left */
 
 static uint32_t silence_chunks;  /* still to be emitted before ... */
 static uint16_t piece_ticks;     /* ... this period; 0: none */
 static bool piece_pulse;
 static uint16_t owed;            /* held pulses still to be left out */
-static int32_t carry_q8;         /* 1/256 ticks rounded off so far */
+static int32_t carry_q16;        /* 1/65536 ticks rounded off so far */
 static uint16_t ahead_ticks;     /* part of the next interval that has been emitted as silence */
 static bool dir_due;             /* the next single period sets the dir pin */
 static uint32_t closing_chunks;  /* closing interval of the last command emitted: so many PROFILE_CHUNK_TICKS ... */
@@ -221,6 +225,14 @@ static uint16_t absorb_held(void)
     return held;
 }
 
+/* So many pulses may be repeated from now on if the ring runs empty. */
+static void allow_hold(uint8_t pulses)
+{
+    uint8_t lock = atomic_begin();
+    step_hold = pulses > step_held ? (uint8_t)(pulses - step_held) : 0; /* those held meanwhile will be given back */
+    atomic_end(lock);
+}
+
 /* Appends `periods` periods of `top` + 1 ticks. Runs too short to be reloaded in time (periods that need an early reload,
  * no more of them than are waited for) are stretched: their count stays exact. */
 static void push(uint16_t periods, uint16_t top, bool pulse, motion_state_t state)
@@ -230,9 +242,10 @@ static void push(uint16_t periods, uint16_t top, bool pulse, motion_state_t stat
     uint8_t flags = (uint8_t)(state | direction_flags(&command, turn));
     dir_due = dir_due && !turn;
     look_for_end();
+    allow_hold(pulse ? pulses_to_come() : 0); /* first, so that what is held from here on can be given back */
+    if (step_held)
+        owed = (uint16_t)(owed + absorb_held());
     if (pulse) {
-        if (step_held)
-            owed = (uint16_t)(owed + absorb_held());
         uint16_t given = owed < periods ? owed : periods;
         owed = (uint16_t)(owed - given);
         periods = (uint16_t)(periods - given);
@@ -251,12 +264,8 @@ static void push(uint16_t periods, uint16_t top, bool pulse, motion_state_t stat
     s->count_low = (uint8_t)counted;
     s->count_high = (uint8_t)((uint16_t)(counted - 1) >> 8);
     s->flags = flags;
-    uint8_t hold = pulse ? pulses_to_come() : 0;
-    uint8_t lock = atomic_begin();
-    step_hold = hold > step_held ? (uint8_t)(hold - step_held) : 0; /* those held meanwhile will be given back */
     if (periods)
         step_head = (uint8_t)(step_head + SEGMENT_BYTES);
-    atomic_end(lock);
 }
 
 /* The interval that ends with the pulse of the segment at `offset`: its period and the silence before it. */
@@ -334,11 +343,11 @@ static void set_interval(uint32_t chunks, uint32_t ticks, bool pulse)
 }
 
 /* Adds the carried fraction to a time; what remains is carried on. */
-static uint32_t take_carry(uint32_t ticks, uint16_t frac_q8)
+static uint32_t take_carry(uint32_t ticks, uint16_t frac_q16)
 {
-    int32_t carry = carry_q8 + frac_q8;
-    carry_q8 = carry & 0xFF;
-    return (uint32_t)((int32_t)ticks + (carry >> 8));
+    int32_t carry = carry_q16 + frac_q16;
+    carry_q16 = carry & 0xFFFF;
+    return (uint32_t)((int32_t)ticks + (carry >> 16));
 }
 
 /* `pulses` intervals, `longer` of them of ticks + 1, the others of ticks. Too few of either kind for an early reload are
@@ -351,7 +360,7 @@ static void push_run(uint16_t pulses, uint16_t longer, uint16_t ticks, bool fast
         longer = 0;
     else if (pulses - longer <= early)
         longer = pulses;
-    carry_q8 += (int32_t)(int16_t)(ideal - longer) * 256;
+    carry_q16 += (int32_t)(int16_t)(ideal - longer) * 65536;
     if (faster && longer)
         push(longer, ticks, true, state);
     if (pulses != longer)
@@ -377,85 +386,22 @@ static void append_silence(uint16_t periods, uint16_t top, uint8_t flags)
     append(periods, top, (uint16_t)(top - SEGMENT_SILENT), flags);
 }
 
-/* Several groups in the short way: the ramp hardly bends, each group fits the timer, and there are many pulses left. */
-static void emit_steady(uint32_t *left, uint32_t at_most, bool faster, motion_state_t state)
-{
-    uint16_t pulses = ramp.group;
-    uint8_t flags = (uint8_t)(state | direction_flags(&command, false));
-    uint16_t width = pulse_width_ticks();
-    uint16_t longest = (uint16_t)(pulses - 1);
-    /* What may be held meanwhile leaves enough for the groups made here. */
-    uint32_t spare = profile_pulses_left() - STEADY_MOST_GROUPS * pulses;
-    if (spare < 255) {
-        uint8_t lock = atomic_begin();
-        step_hold = (uint8_t)(spare - 1);
-        atomic_end(lock);
-    }
-    uint32_t sum_q8 = (uint32_t)carry_q8;
-    uint16_t made = 0;
-    uint16_t most = at_most > 0x7FFFu ? 0x7FFFu : (uint16_t)at_most;
-    most = (uint16_t)(most - 2 * pulses);
-    while (ramp.steady && ring_free() >= 2 && made <= most) {
-        ramp.steady--;
-        sum_q8 += ramp_step(&ramp) + ramp.excess_q8;
-        uint32_t ticks = sum_q8 >> 8;
-        uint16_t top = (uint16_t)((ticks >> ramp.group_log2) - 1);
-        uint16_t longer = (uint16_t)ticks & longest;
-        if (top < UNSPLIT_BELOW_TICKS) {
-            /* One interval for all: the ticks left over go into the next group. */
-            uint8_t early = early_flags(top);
-            append((uint16_t)(pulses - early_periods(early)), top, width, (uint8_t)(flags | early));
-            sum_q8 -= ((ticks - longer) << 8);
-        } else {
-            sum_q8 = (uint8_t)sum_q8;
-            if (longer && faster)
-                append(longer, (uint16_t)(top + 1), width, flags);
-            append((uint16_t)(pulses - longer), top, width, flags);
-            if (longer && !faster)
-                append(longer, (uint16_t)(top + 1), width, flags);
-        }
-        made = (uint16_t)(made + pulses);
-        if (step_held)
-            break;
-    }
-    carry_q8 = (int32_t)sum_q8;
-    *left -= made;
-    add_pulses(flags, made);
-}
-
 static void begin_ramp(motion_state_t state)
 {
     if (ramp_state == state)
         return;
     ramp_state = state;
-    ramp.steady = 0;
+    block.runs = 0;
+    block.shape = BLOCK_SPLIT;
     if (state == MOTION_ACCEL)
         profile_begin_accel(&profile, &basis, &ramp);
     else
         profile_begin_decel(&profile, &basis, &ramp);
 }
 
-/* The next intervals of a ramp. */
-static void emit_ramp(uint32_t *left, uint32_t at_most, motion_state_t state, bool faster)
+/* `pulses` intervals of a ramp that last `ticks` together. */
+static void emit_flat(uint16_t pulses, uint32_t ticks, motion_state_t state, bool faster)
 {
-    begin_ramp(state);
-    if (ring_free() > RING_LOW) {
-        if (!ramp.hurry)
-            ramp.steady = 0;
-        ramp.hurry = true;
-    } else if (ring_free() < RING_LOW / 2) {
-        ramp.hurry = false;
-    }
-    /* Enough left that held pulses can be given back, and periods that need no early reload. */
-    if (ramp.steady && at_most >= 2u * ramp.group && profile_pulses_left() > STEADY_MOST_GROUPS * ramp.group && !step_held &&
-        !tail_awaited && !dir_due && !owed && carry_q8 >= 0) {
-        emit_steady(left, at_most, faster, state);
-        return;
-    }
-    ramp_time_t sum;
-    uint16_t pulses = ramp_next(&ramp, &basis.ramp, at_most, &sum);
-    *left -= pulses;
-    uint32_t ticks = take_carry(sum.ticks, sum.frac);
     if (pulses == 1) {
         if (ticks > 65535u || ahead_ticks)
             set_interval(ticks >> PROFILE_CHUNK_LOG2, ticks & (PROFILE_CHUNK_TICKS - 1), true);
@@ -463,14 +409,91 @@ static void emit_ramp(uint32_t *left, uint32_t at_most, motion_state_t state, bo
             push(1, (uint16_t)(ticks - 1), true, state);
         return;
     }
-    uint32_t each = ticks;
-    if ((pulses & (pulses - 1)) == 0) {
-        for (uint16_t g = pulses; g > 1; g >>= 1)
-            each >>= 1;
-    } else {
-        each /= pulses; /* the last group of a ramp */
-    }
+    uint32_t each = ticks / pulses;
     push_run(pulses, (uint16_t)((uint16_t)ticks - (uint16_t)each * pulses), (uint16_t)each, faster, state);
+}
+
+/* Appends what the ring has room for of the block, which is part of the phase that has so many pulses left. */
+static void emit_block(uint32_t *left)
+{
+    look_for_end();
+    uint8_t pulses = block.pulses;
+    uint8_t runs = block.runs;
+    uint32_t spare = profile_pulses_left() - 1; /* the closing interval has one */
+    uint16_t planned = (uint16_t)(runs * pulses);
+    /* First, so that what is held from here on can be given back. */
+    allow_hold(spare < planned ? 0 : spare - planned > 254 ? 254 : (uint8_t)(spare - planned));
+    if (step_held) {
+        owed = (uint16_t)(owed + absorb_held());
+        spare = profile_pulses_left() - 1;
+    }
+    if (spare > *left)
+        spare = *left;
+    if (spare < planned) /* held pulses have been taken from it */
+        block.runs = runs = (uint8_t)(spare / pulses);
+    block_append(&block);
+    uint16_t made = (uint16_t)((uint8_t)(runs - block.runs) * pulses);
+    *left -= made;
+    add_pulses(block.flags, made);
+    if (block.runs == 0)
+        carry_q16 += (int32_t)(block.shape & BLOCK_SPLIT ? block.carry_q16 : (uint32_t)block.carry_q16 * pulses);
+}
+
+/* Begins a block of a group in runs, with a mean interval in 1/65536 tick; no change within it. */
+static void begin_block(uint32_t mean_q16, uint8_t group_log2, uint8_t run_log2, motion_state_t state)
+{
+    block.top_q16 = mean_q16 - 65536u;
+    block.slope_q16 = 0;
+    block.curve_q16 = 0;
+    block.carry_q16 = 0;
+    block.width = pulse_width_ticks();
+    block.flags = (uint8_t)(state | direction_flags(&command, false));
+    block.shape = mean_q16 >> 16 < BLOCK_SPLIT_TICKS ? 0 : BLOCK_SPLIT;
+    block.pulses = (uint8_t)(1u << run_log2);
+    block.halvings = (uint8_t)(group_log2 - run_log2);
+    block.runs = (uint8_t)(1u << block.halvings);
+}
+
+/* The next intervals of a ramp. */
+static void emit_ramp(uint32_t *left, uint32_t at_most, motion_state_t state, bool faster)
+{
+    begin_ramp(state);
+    /* Where runs of a few pulses could not be reloaded in time, the last one is of many. */
+    bool fast = !(block.shape & BLOCK_SPLIT);
+    bool rest = fast && at_most < 2 * REST_PULSES;
+    bool plain = rest || ahead_ticks || dir_due || owed;
+    uint32_t kept = 0;
+    if (plain && !rest)
+        kept = at_most - 1;
+    else if (fast && !rest)
+        kept = REST_PULSES;
+    at_most -= kept;
+    uint32_t ticks = 0;
+    uint8_t pulses = 0;
+    do {
+        ramp_time_t sum;
+        uint16_t group = ramp_next(&ramp, &basis.ramp, at_most, &sum);
+        if (ramp.shaped && !plain) {
+            begin_block((sum.ticks << 16 | sum.frac_q16) >> ramp.group_log2, ramp.group_log2, ramp.run_log2, state);
+            uint32_t carry = (uint32_t)carry_q16;
+            carry_q16 = 0;
+            if (block.shape & BLOCK_SPLIT && carry <= UINT16_MAX)
+                block.carry_q16 = (uint16_t)carry;
+            else
+                block.top_q16 += carry >> ramp.group_log2;
+            block.slope_q16 = ramp.slope_q16;
+            block.curve_q16 = ramp.curve_q16;
+            if (faster)
+                block.shape |= BLOCK_FASTER;
+            emit_block(left);
+            return;
+        }
+        ticks += take_carry(sum.ticks, sum.frac_q16);
+        pulses = (uint8_t)(pulses + group);
+        at_most -= group;
+    } while (rest && at_most);
+    *left -= pulses;
+    emit_flat(pulses, ticks, state, faster);
 }
 
 static void emit_cruise(uint32_t *left, uint32_t at_most)
@@ -485,25 +508,32 @@ static void emit_cruise(uint32_t *left, uint32_t at_most)
     }
     if (chunks || ahead_ticks) {
         (*left)--;
-        ticks = take_carry(ticks, frac);
+        ticks = take_carry(ticks, (uint16_t)(frac << 8));
         set_interval(chunks, ticks, true);
         return;
     }
     uint16_t run = at_most > 65000u ? 65000u : (uint16_t)at_most;
-    if (frac == 0) {
+    if (frac == 0 || run < 8) {
         *left -= run;
-        push(run, (uint16_t)(ticks - 1), true, MOTION_CRUISE);
-    } else {
-        uint16_t block = 8;
-        while (block < 1024 && block * ticks < CRUISE_GROUP_TICKS)
-            block = (uint16_t)(block * 2);
-        if (run > block)
-            run = block;
-        uint32_t fraction = (uint32_t)run * frac + (uint32_t)carry_q8;
-        carry_q8 = (uint8_t)fraction;
-        *left -= run;
-        push_run(run, (uint16_t)(fraction >> 8), (uint16_t)ticks, true, MOTION_CRUISE);
+        uint32_t fraction = (uint32_t)frac * run;
+        emit_flat(run, take_carry(ticks * run + (fraction >> 8), (uint16_t)(fraction << 8)), MOTION_CRUISE, true);
+        return;
     }
+    /* Runs of two neighbouring values. */
+    uint8_t run_log2 = 3;
+    while (run_log2 < 7 && ticks << run_log2 < CRUISE_GROUP_TICKS && run >> run_log2 > 1)
+        run_log2++;
+    begin_block(ticks << 16 | (uint32_t)frac << 8, run_log2, run_log2, MOTION_CRUISE);
+    run = (uint16_t)(run >> run_log2);
+    block.runs = (uint8_t)(run > 255u ? 255u : run);
+    uint32_t carry = (uint32_t)carry_q16;
+    if (!(block.shape & BLOCK_SPLIT))
+        carry >>= run_log2;
+    if (carry <= UINT16_MAX) {
+        block.carry_q16 = (uint16_t)carry;
+        carry_q16 = 0;
+    }
+    emit_block(left);
 }
 
 /* The interval after the last pulse of the command: body, then tail. */
@@ -515,12 +545,12 @@ static void begin_closing(void)
     motion_state_t state = p->decel_pulses ? MOTION_DECEL : p->cruise_pulses ? MOTION_CRUISE : MOTION_ACCEL;
     if (state == MOTION_CRUISE) {
         chunks = p->cruise.chunks;
-        ticks = take_carry(p->cruise.ticks_q8 >> 8, (uint8_t)p->cruise.ticks_q8);
+        ticks = take_carry(p->cruise.ticks_q8 >> 8, (uint16_t)(p->cruise.ticks_q8 << 8));
     } else {
         begin_ramp(state);
         ramp_time_t sum;
         (void)ramp_next(&ramp, &basis.ramp, 1, &sum);
-        ticks = take_carry(sum.ticks, sum.frac);
+        ticks = take_carry(sum.ticks, sum.frac_q16);
         chunks = ticks >> PROFILE_CHUNK_LOG2;
         ticks &= PROFILE_CHUNK_TICKS - 1;
     }
@@ -573,6 +603,12 @@ static bool emit(void)
         return true;
     }
     profile_t *p = &profile;
+    if (block.runs) {
+        emit_block(ramp_state == MOTION_ACCEL    ? &p->accel_pulses
+                   : ramp_state == MOTION_CRUISE ? &p->cruise_pulses
+                                                 : &p->decel_pulses);
+        return true;
+    }
     switch (stage) {
     case STAGE_REST:
         return false;
@@ -634,10 +670,11 @@ static void begin_ring(void)
     step_held = 0;
     step_idle = 0;
     owed = 0;
-    carry_q8 = 0;
+    carry_q16 = 0;
     ahead_ticks = 0;
     silence_chunks = 0;
     piece_ticks = 0;
+    block.runs = 0;
     dir_due = false;
     tail_valid = false;
     joined = false;
@@ -662,10 +699,10 @@ static uint16_t certain_ticks(void)
 {
     if (v_in_play != basis.v_slow)
         return 0;
-    if (command.accel == ACCEL_NONE) /* the cruise interval */
-        return command.flags & MOTION_CYCLE && command.velocity >> basis.factor_log2 >= AHEAD_SHORT_TICKS / 8
-                   ? AHEAD_SHORT_TICKS
-                   : 0;
+    if (command.accel == ACCEL_NONE) { /* the cruise interval, or that of the deceleration */
+        uint16_t flat = command.decel == ACCEL_NONE ? AHEAD_SHORT_TICKS : AHEAD_LONG_TICKS;
+        return command.flags & MOTION_CYCLE && command.velocity >> basis.factor_log2 >= flat / 8 ? flat : 0;
+    }
     if (basis.slow_ticks < AHEAD_TICKS + SHORTEST_PIECE_TICKS)
         return 0;
     uint16_t least_rpm;
@@ -686,6 +723,24 @@ static uint16_t certain_ticks(void)
     bool fast = command.flags & MOTION_CYCLE ? velocity < 65536u && velocity * least_rpm <= basis.us_rpm
                                              : velocity >= least_rpm;
     return fast ? ahead : 0;
+}
+
+/* Emits enough to be played until the next round of the main loop, and where a ramp begins steeply, before the timer
+ * runs, until the intervals that are slow to plan, one by one, are over. */
+static void fill(void)
+{
+    uint32_t ticks = 0;
+    uint8_t offset = step_head;
+    uint32_t periods = 0;
+    while ((ticks < START_TICKS || periods < START_PERIODS ||
+            (!playing && (ramp_state == MOTION_ACCEL || ramp_state == MOTION_DECEL) && (ramp.steep || !ramp.shaped))) &&
+           ring_free() >= RING_RESERVE && emit()) {
+        for (; offset != step_head; offset = (uint8_t)(offset + SEGMENT_BYTES)) {
+            uint16_t counted = counted_periods(segment_at(offset));
+            periods += counted;
+            ticks += period_ticks(segment_at(offset)) * counted;
+        }
+    }
 }
 
 /* Starts the command, which is not planned yet, from standstill. */
@@ -716,19 +771,9 @@ static void start_now(void)
         play();
     }
     plan();
-    if (!playing) {
-        /* The timer may run as soon as it has enough to do until the next round of the main loop. */
-        uint32_t ticks = 0;
-        uint8_t offset;
-        do {
-            offset = step_head;
-            if (!emit())
-                break;
-            if (offset != step_head)
-                ticks += period_ticks(segment_at(offset)) * counted_periods(segment_at(offset));
-        } while (ticks < START_TICKS);
+    fill();
+    if (!playing)
         play();
-    }
 }
 
 /* Is the velocity in play kept until now? */
@@ -756,6 +801,12 @@ static uint32_t ticks_to_tail(void)
     look_for_end();
     if (!tail_valid || !tail_awaited)
         return 0;
+    if (offset == tail_offset) {
+        /* It is loaded: what is left of the period before it. */
+        uint16_t top = segment_at((uint8_t)(offset - SEGMENT_BYTES))->top;
+        uint16_t counter = step_port_counter();
+        return at.period_over || counter > top ? 0 : top - counter;
+    }
     while (offset != tail_offset && ticks <= JOIN_SOON_TICKS) {
         const segment_t *s = segment_at(offset);
         ticks += period_ticks(s) * periods;
@@ -781,17 +832,40 @@ static bool tail_is_over(void)
 static void join_next(void)
 {
     uint32_t ticks = ticks_to_tail();
-    bool timely = ticks >= (next.flags & MOTION_LINEAR ? JOIN_LINEAR_TICKS : JOIN_TICKS);
+    uint16_t needed = next.flags & MOTION_LINEAR ? JOIN_LINEAR_TICKS : JOIN_TICKS;
+    if (next.accel == ACCEL_NONE && next.decel == ACCEL_NONE)
+        needed = JOIN_FLAT_TICKS;
+    bool timely = ticks >= needed;
     if (ticks > JOIN_SOON_TICKS)
         return; /* later */
     if (!timely && !tail_is_over())
         return; /* at its end */
     bool turns = is_ccw(&next) != is_ccw(&command);
+    uint8_t flags = (uint8_t)(MOTION_STOP | direction_flags(&next, turns));
     uint32_t wait = wait_ticks(next.start_wait_us);
+    if (timely) {
+        uint8_t offset = tail_offset;
+        bool done;
+        if (wait >= SHORTEST_PIECE_TICKS) {
+            done = step_port_drop_after(offset);
+        } else if (tail_fast && !turns && wait == 0) {
+            offset = last_run_offset;
+            done = step_port_extend(offset);
+        } else {
+            uint16_t top = (uint16_t)(segment_at(offset)->top + wait);
+            if (turns && top < TURN_TICKS + pulse_width_ticks())
+                top = (uint16_t)(TURN_TICKS + pulse_width_ticks());
+            done = step_port_arm(offset, top, (uint16_t)(top - pulse_width_ticks()), flags);
+        }
+        if (!done)
+            return; /* not at this moment */
+        joined_offset = offset;
+    }
     command = next;
     next_taken = false;
     silence_chunks = 0;
     piece_ticks = 0;
+    block.runs = 0;
     ramp_state = MOTION_STANDBY;
     if (!timely) {
         if (step_idle)
@@ -799,37 +873,22 @@ static void join_next(void)
         start_now();
         return;
     }
+    joined = true;
+    tail_awaited = false;
+    tail_valid = false;
+    ended++;
     /* Longer than the gap the wait means a start from slow speed. */
     if (wait >> PROFILE_CHUNK_LOG2 >= closing_chunks && wait > (closing_chunks << PROFILE_CHUNK_LOG2) + closing_ticks)
         expire_gap();
-    plan();
-    joined_offset = tail_offset;
+    stage = STAGE_RUN;
     if (wait >= SHORTEST_PIECE_TICKS) {
-        joined = step_port_drop_after(tail_offset);
         dir_due = turns;
         stage = STAGE_LEAD;
     } else {
-        uint8_t flags = (uint8_t)(MOTION_STOP | direction_flags(&command, turns));
-        if (tail_fast && !turns && wait == 0) {
-            joined_offset = last_run_offset;
-            joined = step_port_extend(last_run_offset);
-        } else {
-            uint16_t top = (uint16_t)(segment_at(tail_offset)->top + wait);
-            if (turns && top < TURN_TICKS + pulse_width_ticks())
-                top = (uint16_t)(TURN_TICKS + pulse_width_ticks());
-            joined = step_port_arm(tail_offset, top, (uint16_t)(top - pulse_width_ticks()), flags);
-        }
-        if (joined)
-            add_pulses(flags, 1);
-        stage = STAGE_RUN;
+        add_pulses(flags, 1);
     }
-    if (joined) {
-        tail_awaited = false;
-        ended++;
-    } else {
-        start_now(); /* cannot be, unless an interrupt took a millisecond */
-    }
-    tail_valid = false;
+    plan();
+    fill();
 }
 
 status_t engine_check(const motion_command_t *c)
@@ -853,7 +912,7 @@ void engine_submit(const motion_command_t *submitted)
     }
 }
 
-bool engine_poll(void)
+NOINLINE bool engine_poll(void)
 {
     bool worked = false;
     look_for_end();
@@ -890,7 +949,7 @@ bool engine_poll(void)
     uint8_t rounds = 6;
     if (playing) {
         do {
-            if (ring_free() < RING_RESERVE || !emit())
+            if (ring_free() < (block.runs ? RING_REFILL : RING_RESERVE) || !emit())
                 break;
             worked = true;
         } while (ring_free() > SEGMENT_COUNT / 2 && --rounds);
@@ -934,6 +993,7 @@ static void halt(void)
     tail_valid = false;
     silence_chunks = 0;
     piece_ticks = 0;
+    block.runs = 0;
     stage = STAGE_REST;
     motion_state = MOTION_STANDBY;
 }
@@ -950,6 +1010,7 @@ void engine_stop(void)
  * (it ends by itself now, or it stands in the middle of a wait or of an interval longer than that of slow speed). */
 static uint32_t cut(void)
 {
+    allow_hold(0);
     step_snapshot_t at = step_port_snapshot();
     uint8_t offset = (uint8_t)(at.tail - SEGMENT_BYTES);
     uint16_t left = at.to_count;
@@ -962,7 +1023,9 @@ static uint32_t cut(void)
         if (is_silent(s)) {
             if ((s->flags & SEGMENT_STATE_MASK) == MOTION_STOP)
                 return 0;
-        } else if (ticks >= keep_ticks || (uint8_t)(offset + SEGMENT_BYTES) == step_head) {
+        } else if ((ticks >= keep_ticks && (left > 1 || offset != (uint8_t)(at.tail - SEGMENT_BYTES))) ||
+                   (uint8_t)(offset + SEGMENT_BYTES) == step_head) {
+            /* (Not the last period of the loaded segment: what follows it may be loaded meanwhile.) */
             uint16_t needed = (uint16_t)(keep_ticks / period + 4u);
             if (needed < left)
                 left = needed;
@@ -983,6 +1046,7 @@ static uint32_t cut(void)
     tail_valid = false;
     silence_chunks = 0;
     piece_ticks = 0;
+    block.runs = 0;
     ahead_ticks = 0;
     return interval_ticks;
 }

@@ -13,7 +13,7 @@ void profile_basis(profile_basis_t *basis, uint16_t steps_per_rev, uint8_t facto
     basis->factor_log2 = factor_log2;
     basis->v_slow = (uint32_t)slow_rpm * 100u << factor_log2;
     ramp_time_t slow = ramp_interval(&basis->ramp, basis->v_slow);
-    basis->slow_ticks = slow.ticks + (slow.frac != 0);
+    basis->slow_ticks = slow.ticks + (slow.frac_q16 != 0);
 }
 
 uint32_t profile_rpm(const profile_basis_t *basis, const motion_command_t *command)
@@ -259,7 +259,7 @@ void profile_plan(profile_t *profile, const profile_basis_t *basis, const motion
     }
     if (!truncated)
         profile->cruise_pulses += command->extra_pulses;
-    if (profile->cruise_pulses == 0)
+    if (profile->cruise_pulses == 0 && (truncated || profile->accel_pulses != 0))
         limit_peak(profile, basis);
 
     /* The velocity that stays. */
@@ -291,7 +291,6 @@ void profile_begin_accel(const profile_t *profile, const profile_basis_t *basis,
     }
     wide_t c;
     wide_t t = 0;
-    wide_t rest = 0;
     ramp_linear_c(&c, basis->steps_per_rev, basis->factor_log2, profile->accel_centi);
     if (profile->v_start != basis->v_slow || !profile->faster) {
         /* From zero to v_start: v / accel = RPM * pi / 30 / (centi / 100) s = units / (100 F) * 2.680825731e9 / centi
@@ -300,11 +299,14 @@ void profile_begin_accel(const profile_t *profile, const profile_basis_t *basis,
         multiply(&t, 2680825731u);
         wide_divide(&t, profile->accel_centi * 100u << basis->factor_log2);
     }
-    ramp_begin_linear(ramp, &c, &t, &rest, profile->faster, 0);
     /* Whole full steps may pass the target a little: not beyond the interval of the cruise. */
-    ramp->bound_q8 = profile->cruise.chunks >> (32 - PROFILE_CHUNK_LOG2 - 8)
-                         ? UINT32_MAX
-                         : (profile->cruise.chunks << (PROFILE_CHUNK_LOG2 + 8)) + profile->cruise.ticks_q8;
+    const profile_interval_t *cruise = &profile->cruise;
+    ramp_time_t bound;
+    bound.ticks = cruise->chunks >> (32 - PROFILE_CHUNK_LOG2)
+                      ? UINT32_MAX
+                      : (cruise->chunks << PROFILE_CHUNK_LOG2) + (cruise->ticks_q8 >> 8);
+    bound.frac_q16 = (uint16_t)(cruise->ticks_q8 << 8);
+    ramp_begin_linear(ramp, &c, &t, profile->accel_pulses, profile->faster, bound);
 }
 
 void profile_begin_decel(const profile_t *profile, const profile_basis_t *basis, ramp_t *ramp)
@@ -318,17 +320,14 @@ void profile_begin_decel(const profile_t *profile, const profile_basis_t *basis,
         return;
     }
     wide_t c;
-    wide_t t;
-    wide_t rest;
     if (profile->steep_decel) {
         /* From v_peak to zero in n pulses: t = 2 n interval(v_peak), C = t^2 / n. */
         ramp_time_t interval = ramp_interval(&basis->ramp, profile->v_peak);
-        square(&c, interval.ticks << 4 | interval.frac >> 4);
+        square(&c, interval.ticks << 4 | interval.frac_q16 >> 12);
         multiply(&c, n << 2);
     } else {
         ramp_linear_c(&c, basis->steps_per_rev, basis->factor_log2, profile->decel_centi);
     }
-    ramp_linear_time(&t, &c, n, &rest);
-    ramp_begin_linear(ramp, &c, &t, &rest, false, 0);
-    ramp_bound(ramp, &basis->ramp, basis->v_slow);
+    wide_t t = 0;
+    ramp_begin_linear(ramp, &c, &t, n, false, ramp_interval(&basis->ramp, basis->v_slow));
 }

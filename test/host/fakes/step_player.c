@@ -300,18 +300,26 @@ void step_player_advance(uint64_t ticks)
     run_to(p.now + ticks);
 }
 
-bool step_player_to_next_load(void)
+bool step_player_to_next_load_or(uint64_t ticks)
 {
     unsigned loads = p.loads;
+    uint64_t last = ticks < UINT64_MAX - p.now ? p.now + ticks : UINT64_MAX;
     while (p.clocked && p.counting) {
         uint64_t end = period_end();
         if (!p.waiting && p.to_count > 1 && p.next_top == p.top && p.next_match == p.match)
             end = p.begin + (uint64_t)p.to_count * (p.top + 1u);
+        if (end > last)
+            end = last;
         run_to(end > p.now ? end : p.now);
-        if (p.loads != loads || !p.counting)
+        if (p.loads != loads || !p.counting || p.now >= last)
             return true;
     }
     return false;
+}
+
+bool step_player_to_next_load(void)
+{
+    return step_player_to_next_load_or(UINT64_MAX);
 }
 
 uint64_t step_player_now(void)
@@ -485,6 +493,11 @@ step_snapshot_t step_port_snapshot(void)
         .period_over = p.over,
     };
     return at;
+}
+
+uint16_t step_port_counter(void)
+{
+    return (uint16_t)(p.now - p.begin);
 }
 
 /* In the ring, not loaded: 1. Loaded: 0. Gone: -1. */

@@ -40,6 +40,7 @@ extern uint32_t step_player_load_ticks; /* STEP_PLAYER_LOAD_TICKS after a reset 
 void step_player_advance(uint64_t ticks); /* a little more if the interrupt is at work then */
 void step_player_advance_to(uint64_t time);
 bool step_player_to_next_load(void); /* until the interrupt has loaded a segment or run out; false: nothing will come */
+bool step_player_to_next_load_or(uint64_t ticks); /* the same, or until so many have passed */
 uint64_t step_player_now(void);
 bool step_player_stopped(void); /* the timer has no clock: no edge will come */
 
