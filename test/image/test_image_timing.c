@@ -413,8 +413,7 @@ static void test_interrupts_and_masked_sections_stay_short(void)
 int main(void)
 {
     UNITY_BEGIN();
-    if (getenv("SAC_KNOWN_FAILURES")) /* fails in this version: docs/design.md, known failures */
-        RUN_TEST(test_clk_rises_once_for_each_pulse);
+    RUN_TEST(test_clk_rises_once_for_each_pulse);
     RUN_TEST(test_dir_is_valid_before_the_first_edge_of_a_command);
     RUN_TEST(test_clk_is_high_for_the_pulse_time_and_low_for_a_microsecond_at_least);
     RUN_TEST(test_at_rest_clk_and_tx_en_are_low_and_ops_idle);
