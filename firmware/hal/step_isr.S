@@ -34,6 +34,18 @@ step_idle:    .skip 1
 step_late:    .skip 1
 motion_state: .skip 1
 
+/* The segment at Z into the timer's buffers: high bytes first (TEMP, datasheet section 16.3). */
+.macro buffers
+        ldd     r24, Z + 1
+        sts     OCR1AH, r24
+        ldd     r24, Z + 0
+        sts     OCR1AL, r24
+        ldd     r24, Z + 3
+        sts     OCR1BH, r24
+        ldd     r24, Z + 2
+        sts     OCR1BL, r24
+.endm
+
 /* Counters, tail, dir and state for the segment at Z, which has been loaded or is about to be. */
 .macro account
         ldd     r24, Z + 4
@@ -119,14 +131,7 @@ early:
         clt
         rjmp    3b
 4:
-        ldd     r24, Z + 1
-        sts     OCR1AH, r24
-        ldd     r24, Z + 0
-        sts     OCR1AL, r24
-        ldd     r24, Z + 3
-        sts     OCR1BH, r24
-        ldd     r24, Z + 2
-        sts     OCR1BL, r24
+        buffers
         sbic    io(TIFR1), TOV1
         rjmp    late
 leave:
@@ -135,14 +140,7 @@ leave:
         rjmp    return
 
 load:
-        ldd     r24, Z + 1
-        sts     OCR1AH, r24
-        ldd     r24, Z + 0
-        sts     OCR1AL, r24
-        ldd     r24, Z + 3
-        sts     OCR1BH, r24
-        ldd     r24, Z + 2
-        sts     OCR1BL, r24
+        buffers
         sbic    io(TIFR1), TOV1
         rjmp    account_late
         account

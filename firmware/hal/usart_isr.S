@@ -18,6 +18,22 @@
 #define ADDRESS(name) _SFR_MEM_ADDR(name)
 #define IO_SREG _SFR_IO_ADDR(SREG)
 
+; Z: the receive ring's next free slot, r25: the head after it; to `full` if there is none. r24 is left alone.
+.macro FREE_SLOT
+    lds  r30, usart_rx_head
+    mov  r25, r30
+    inc  r25
+    cpi  r25, USART_RX_BYTES
+    brne . + 2                  ; over the next instruction
+    ldi  r25, 0
+    lds  r31, usart_rx_tail
+    cp   r25, r31
+    breq full
+    ldi  r31, 0
+    subi r30, lo8(-(usart_rx_bytes))
+    sbci r31, hi8(-(usart_rx_bytes))
+.endm
+
 .section .text
 
 .macro ENTER enable_bit         ; cycles since the flag was raised
@@ -57,18 +73,7 @@ USART_RX_vect:
     andi r25, (1 << FE0) | (1 << DOR0)
     brne damaged
 good:
-    lds  r30, usart_rx_head
-    mov  r25, r30
-    inc  r25
-    cpi  r25, USART_RX_BYTES
-    brne . + 2                  ; over the next instruction
-    ldi  r25, 0
-    lds  r31, usart_rx_tail
-    cp   r25, r31
-    breq full
-    ldi  r31, 0
-    subi r30, lo8(-(usart_rx_bytes))
-    sbci r31, hi8(-(usart_rx_bytes))
+    FREE_SLOT
     st   Z, r24
     sts  usart_rx_head, r25
     ldi  r24, 1
@@ -96,18 +101,7 @@ damaged:
     ldi  r24, USART_DAMAGED
     sbrc r25, FE0
     rjmp good
-    lds  r30, usart_rx_head
-    mov  r25, r30
-    inc  r25
-    cpi  r25, USART_RX_BYTES
-    brne . + 2                  ; over the next instruction
-    ldi  r25, 0
-    lds  r31, usart_rx_tail
-    cp   r25, r31
-    breq full
-    ldi  r31, 0
-    subi r30, lo8(-(usart_rx_bytes))
-    sbci r31, hi8(-(usart_rx_bytes))
+    FREE_SLOT
     sts  usart_rx_head, r25
     ldi  r25, USART_DAMAGED
     st   Z, r25
