@@ -9,7 +9,7 @@ CHECK(TOP, top_q16);
 CHECK(SLOPE, slope_q16);
 CHECK(CURVE, curve_q16);
 CHECK(CARRY, carry_q16);
-CHECK(WIDTH, width);
+CHECK(WIDTH, width_ticks);
 CHECK(RUNS, runs);
 CHECK(PULSES, pulses);
 CHECK(HALVINGS, halvings);
@@ -25,7 +25,7 @@ static void append(const block_t *block, uint8_t periods, uint16_t top)
     uint8_t early = (uint8_t)((top < SEGMENT_EARLY1_BELOW_TICKS - 1) + (top < SEGMENT_EARLY2_BELOW_TICKS - 1) +
                               (top < SEGMENT_EARLY3_BELOW_TICKS - 1));
     s->top = top;
-    s->match = (uint16_t)(top - block->width);
+    s->match = (uint16_t)(top - block->width_ticks);
     s->count_low = (uint8_t)(periods - early);
     s->count_high = 0;
     s->flags = (uint8_t)(block->flags | early << SEGMENT_EARLY_SHIFT);

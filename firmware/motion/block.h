@@ -5,6 +5,8 @@
  *          what the law changes in the group. A block turns the group into shorter runs that follow it.
  * Units:   ticks of 62.5 ns in 1/65536; a run has 1, 2, 4, ... 128 pulses.
  * Context: main loop only. In assembler on the AVR (block.S, cycles there), elsewhere in block.c.
+ * Errors:  none.
+ * Source:  docs/design.md, "Blocks".
  * Limits:  intervals below 65,536 ticks. Split: none short enough to be reloaded early (segment.h). Otherwise: none above
  *          256 ticks, and more pulses than are waited for then. */
 #ifndef MOTION_BLOCK_H
@@ -24,7 +26,7 @@ typedef struct {
     int32_t slope_q16; /* its change to the run after it */
     int32_t curve_q16; /* change of slope_q16 from run to run */
     uint16_t carry_q16; /* what has been rounded off so far; less than a tick of the sum, or of each interval (unsplit) */
-    uint16_t width;    /* pulse width in ticks */
+    uint16_t width_ticks; /* of a pulse */
     uint8_t runs;      /* still to be appended */
     uint8_t pulses;    /* of a run */
     uint8_t halvings;  /* until the first run has been appended: the parabola is that of 2^halvings runs together */

@@ -446,7 +446,7 @@ static void begin_block(uint32_t mean_q16, uint8_t group_log2, uint8_t run_log2,
     block.slope_q16 = 0;
     block.curve_q16 = 0;
     block.carry_q16 = 0;
-    block.width = pulse_width_ticks();
+    block.width_ticks = pulse_width_ticks();
     block.flags = (uint8_t)(state | direction_flags(&command, false));
     block.shape = mean_q16 >> 16 < BLOCK_SPLIT_TICKS ? 0 : BLOCK_SPLIT;
     block.pulses = (uint8_t)(1u << run_log2);

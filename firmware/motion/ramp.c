@@ -107,9 +107,7 @@ void ramp_begin_harmonic(ramp_t *ramp, const ramp_constants_t *constants, uint32
     ramp->u.harmonic.next2 = 2 * v_first;
     ramp->u.harmonic.cap2 = 2 * v_cap;
     ramp->u.harmonic.step = step;
-    /* The steeper, the wider: groups have to last as long as it takes to plan them. */
     ramp->steep = step > (uint32_t)wide_from_byte(&constants->k2_q16, 3) >> 10; /* K / 2^17 */
-    ramp->u.harmonic.widest = ramp->steep ? 2 : 4;
 }
 
 static void harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, uint32_t left, ramp_time_t *sum)
@@ -125,7 +123,9 @@ static void harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, uint3
     else
         *sum = interval_at_twice(constants, capped ? cap2 : next2);
     uint32_t ticks = sum->ticks;
-    uint32_t limit = capped ? (next2 - cap2) >> 1 : next2 >> (ramp->u.harmonic.widest + 1);
+    /* A group changes the velocity by a 16th at most, or a quarter: steep ones have to last as long as it takes to plan
+     * them. */
+    uint32_t limit = capped ? (next2 - cap2) >> 1 : next2 >> (ramp->steep ? 3 : 5);
     if (ticks >= LONG_TICKS)
         limit >>= 1;
     uint8_t log2 = 0;
@@ -211,8 +211,10 @@ static void root_at(const ramp_t *ramp, ramp_root_t *t)
         wide_copy(&rest, &ramp->u.linear.x);
         wide_subtract(&rest, &square);
         rest <<= 15;
-        if (t->whole)
-            t->frac_q16 = (wide_divide(&rest, t->whole), (uint16_t)rest);
+        if (t->whole) {
+            wide_divide(&rest, t->whole);
+            t->frac_q16 = (uint16_t)rest;
+        }
     }
 }
 
@@ -276,12 +278,20 @@ void ramp_begin_linear(ramp_t *ramp, const wide_t *c_q8, const wide_t *t_q4, uin
     set_ticks(ramp, between(ramp, &ramp->u.linear.t, &next) >> 4);
 }
 
+/* The largest group of so many ticks a pulse that lasts no longer than `limit`. */
+static uint8_t widest(uint32_t ticks, uint32_t limit, uint32_t left, uint8_t most_log2)
+{
+    uint8_t log2 = 0;
+    for (; log2 < most_log2 && ticks <= limit >> 1 && left >= 2u << log2; log2++)
+        ticks *= 2;
+    return log2;
+}
+
+/* Beyond the bound all intervals are equal. */
 static void bounded_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum)
 {
     uint32_t ticks = ramp->u.linear.bound.ticks;
-    uint8_t log2 = 0;
-    while (log2 < GROUP_MAX_LOG2 && (ticks << log2) * 2 <= GROUP_MAX_TICKS && left >= 2u << log2)
-        log2++;
+    uint8_t log2 = widest(ticks, GROUP_MAX_TICKS, left, GROUP_MAX_LOG2);
     uint32_t frac = (uint32_t)ramp->u.linear.bound.frac_q16 << log2;
     sum->ticks = (ticks << log2) + (frac >> 16);
     sum->frac_q16 = (uint16_t)frac;
@@ -307,11 +317,7 @@ static void linear_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum)
         limit = GROUP_MAX_TICKS;
     if (span >= LONG_TICKS)
         limit >>= 1;
-    uint8_t log2 = 0;
-    while (log2 < ramp->u.linear.most_log2 && 2 * span <= limit && left >= 2u << log2) {
-        span *= 2;
-        log2++;
-    }
+    uint8_t log2 = widest(span, limit, left, ramp->u.linear.most_log2);
     ramp_root_t begin = ramp->u.linear.t;
     ramp_root_t end;
     wide_t step = (uint16_t)(1u << log2 >> (log2 != 0));

@@ -8,6 +8,7 @@
  * Units:   ticks of 62.5 ns with a fraction in 1/65536. Velocities in "units" = RPM * 100 * microstep factor, so that a
  *          ramp value in hundredths is the change per pulse whatever the factor, and interval = K / v.
  * Context: main loop only; no hardware. Tests: test/host/test_ramp.c, test/avr/.
+ * Errors:  none; what is asked for has been checked (profile_check).
  * Limits:  steps_per_rev * slow_rpm >= 58 and steps_per_rev >= 8 (first intervals below about one second).
  */
 #ifndef MOTION_RAMP_H
@@ -27,7 +28,7 @@ typedef struct {
     wide_t k2_q16;
 } ramp_constants_t;
 
-/* A root of 64 bits, and what follows it. */
+/* A time in units of 2^halved / 16 ticks, and 1/65536 of them. */
 typedef struct {
     uint32_t whole;
     uint16_t frac_q16;
@@ -51,7 +52,6 @@ typedef struct {
             uint32_t cap2;     /* never above */
             uint32_t step;     /* change of velocity per pulse */
             uint32_t next_q16; /* interval after the next pulse; 0: not known */
-            uint8_t widest;    /* a group changes the velocity by 2^-widest at most */
         } harmonic;
         struct {
             wide_t x;          /* square of the time from standstill at the next pulse, in units of 2^halved / 16 ticks */
@@ -59,7 +59,7 @@ typedef struct {
             ramp_root_t t;     /* that time */
             ramp_time_t bound; /* no interval above while slowing, none below while speeding up */
             bool bounded;      /* it has been reached: all that is left is equal */
-            uint8_t halved;
+            uint8_t halved;    /* how often units were doubled so that x fits */
             uint8_t most_log2; /* of a group's pulses: less where the bound is near */
         } linear;
     } u;

@@ -363,8 +363,10 @@ static void test_sleep_takes_no_real_time(void)
 static void test_sleep_without_se_does_nothing(void)
 {
     start_remote();
+    board_measures_clear(board);
     command(CMD_SLEEP);
     run_to_label("woken", 100);
+    TEST_ASSERT_EQUAL_UINT64(0, board_measures(board)->sleep_cycles);
 }
 
 static void test_timers_run_on_while_idle(void)

@@ -18,7 +18,7 @@ void setUp(void)
     ticks = 0;
     shortest = 0xFFFF;
     longest = 0;
-    block = (block_t){.width = 32, .flags = 0x21, .shape = BLOCK_SPLIT, .runs = 1, .pulses = 4};
+    block = (block_t){.width_ticks = 32, .flags = 0x21, .shape = BLOCK_SPLIT, .runs = 1, .pulses = 4};
 }
 
 void tearDown(void)
@@ -34,7 +34,7 @@ static void take(void)
         uint8_t count = (uint8_t)(s->count_low + early);
         uint16_t interval = (uint16_t)(s->top + 1u);
         TEST_ASSERT_EQUAL_UINT8(0, s->count_high);
-        TEST_ASSERT_EQUAL_UINT16(s->top - block.width, s->match);
+        TEST_ASSERT_EQUAL_UINT16(s->top - block.width_ticks, s->match);
         TEST_ASSERT_EQUAL_UINT8(block.flags, s->flags & ~SEGMENT_EARLY_MASK);
         TEST_ASSERT_EQUAL_UINT8((interval < SEGMENT_EARLY1_BELOW_TICKS) + (interval < SEGMENT_EARLY2_BELOW_TICKS) +
                                     (interval < SEGMENT_EARLY3_BELOW_TICKS),

@@ -54,7 +54,7 @@ static void look(everything_t *all)
     all->engine = engine_fake;
 }
 
-static void refuse(status_t expected, const char *text)
+static void assert_refused(status_t expected, const char *text)
 {
     static everything_t before, after;
     look(&before);
@@ -117,7 +117,7 @@ static void test_a_full_queue_refuses_the_command_and_its_session_values(void)
     for (int i = 0; i < 30; i++) {
         TEST_ASSERT_EQUAL(STATUS_OK, execute("m5"));
     }
-    refuse(STATUS_QUEUE_FULL, "m200v77a5l1p");
+    assert_refused(STATUS_QUEUE_FULL, "m200v77a5l1p");
 }
 
 /* VEL-005, ACC-001, ACC-008 */
@@ -266,20 +266,20 @@ static void test_case_matters_where_the_manual_says_so(void)
 
 static void test_each_wrong_line_is_refused_and_changes_nothing(void)
 {
-    refuse(STATUS_UNKNOWN_COMMAND, "k");
-    refuse(STATUS_UNKNOWN_COMMAND, "hello");
-    refuse(STATUS_UNKNOWN_COMMAND, "\xE9");
-    refuse(STATUS_SYNTAX, "m200k5");
-    refuse(STATUS_SYNTAX, "g5");
-    refuse(STATUS_SYNTAX, "S5");
-    refuse(STATUS_SYNTAX, "vd5");
-    refuse(STATUS_SYNTAX, "??");
-    refuse(STATUS_NUMBER_MISSING, "vc");
-    refuse(STATUS_NUMBER_TOO_LARGE, "m4294967296");
-    refuse(STATUS_PERIOD_TOO_SHORT, "vc1");
-    refuse(STATUS_VELOCITY_ZERO, "v0");
-    refuse(STATUS_NOT_YET, "m");
-    refuse(STATUS_RANGE, "m5u256");
+    assert_refused(STATUS_UNKNOWN_COMMAND, "k");
+    assert_refused(STATUS_UNKNOWN_COMMAND, "hello");
+    assert_refused(STATUS_UNKNOWN_COMMAND, "\xE9");
+    assert_refused(STATUS_SYNTAX, "m200k5");
+    assert_refused(STATUS_SYNTAX, "g5");
+    assert_refused(STATUS_SYNTAX, "S5");
+    assert_refused(STATUS_SYNTAX, "vd5");
+    assert_refused(STATUS_SYNTAX, "??");
+    assert_refused(STATUS_NUMBER_MISSING, "vc");
+    assert_refused(STATUS_NUMBER_TOO_LARGE, "m4294967296");
+    assert_refused(STATUS_PERIOD_TOO_SHORT, "vc1");
+    assert_refused(STATUS_VELOCITY_ZERO, "v0");
+    assert_refused(STATUS_NOT_YET, "m");
+    assert_refused(STATUS_RANGE, "m5u256");
     TEST_ASSERT_EQUAL_STRING("0..255", commands_refused_range());
 }
 
@@ -297,15 +297,15 @@ static void test_a_wrong_ramp_number_is_refused_with_the_range(void)
 /* TRM-006 */
 static void test_a_line_that_begins_with_a_number_is_not_executed(void)
 {
-    refuse(STATUS_NOT_YET, "85m200");
-    refuse(STATUS_NOT_YET, "0");
+    assert_refused(STATUS_NOT_YET, "85m200");
+    assert_refused(STATUS_NOT_YET, "0");
 }
 
 static void test_commands_of_later_versions_say_that_they_are_not_available(void)
 {
     static const char *const lines[] = {"x", "xm200", "x3", "l", "L5", "ls1", "y", "z", "cc", "qs", "q9m200"};
     for (unsigned i = 0; i < sizeof lines / sizeof lines[0]; i++) {
-        refuse(STATUS_NOT_YET, lines[i]);
+        assert_refused(STATUS_NOT_YET, lines[i]);
     }
     TEST_ASSERT_EQUAL(STATUS_NOT_YET, execute("$R"));
     TEST_ASSERT_EQUAL(STATUS_NOT_YET, execute("$Cb2000"));
@@ -318,8 +318,8 @@ static void test_a_space_ends_the_command_and_a_leading_one_makes_it_blank(void)
     TEST_ASSERT_EQUAL_UINT32(50, session.velocity);
     TEST_ASSERT_EQUAL(STATUS_OK, execute("g junk"));
     TEST_ASSERT_FALSE(engine_fake.gap);
-    refuse(STATUS_OK, "");
-    refuse(STATUS_OK, " m200");
+    assert_refused(STATUS_OK, "");
+    assert_refused(STATUS_OK, " m200");
 }
 
 static void test_too_many_displays_at_once_are_refused(void)

@@ -37,16 +37,16 @@ static status_t read(const char *text)
 }
 
 /* Reads a text that must be refused, and that the session defaults are as before. */
-static void refuse(status_t expected, const char *text)
+static void assert_refused(status_t expected, const char *text)
 {
     const session_t before = defaults;
     TEST_ASSERT_EQUAL_MESSAGE(expected, read(text), text);
     TEST_ASSERT_EQUAL_MEMORY_MESSAGE(&before, &defaults, sizeof before, text);
 }
 
-static void refuse_range(const char *range, const char *text)
+static void assert_refused_range(const char *range, const char *text)
 {
-    refuse(STATUS_RANGE, text);
+    assert_refused(STATUS_RANGE, text);
     TEST_ASSERT_EQUAL_STRING(range, syntax.range);
 }
 
@@ -241,19 +241,19 @@ static void test_velocities_from_below_1_to_above_2200_rpm_are_taken(void)
 /* CLK-015 */
 static void test_velocities_that_cannot_be_kept_are_refused(void)
 {
-    refuse(STATUS_VELOCITY_ZERO, "v0");
-    refuse(STATUS_VELOCITY_ZERO, "v0.9");
-    refuse(STATUS_PERIOD_TOO_SHORT, "vc0");
-    refuse(STATUS_PERIOD_TOO_SHORT, "vc1");
-    refuse(STATUS_PERIOD_TOO_SHORT, "vc2"); /* the pulse of 2 us and 1 us of rest */
-    refuse(STATUS_PERIOD_TOO_SHORT, "v4294967295");
-    refuse(STATUS_VELOCITY_ZERO, "m200v0");
-    refuse(STATUS_PERIOD_TOO_SHORT, "m200vc1a5");
-    refuse(STATUS_PERIOD_TOO_SHORT, "m200v200000d5");
+    assert_refused(STATUS_VELOCITY_ZERO, "v0");
+    assert_refused(STATUS_VELOCITY_ZERO, "v0.9");
+    assert_refused(STATUS_PERIOD_TOO_SHORT, "vc0");
+    assert_refused(STATUS_PERIOD_TOO_SHORT, "vc1");
+    assert_refused(STATUS_PERIOD_TOO_SHORT, "vc2"); /* the pulse of 2 us and 1 us of rest */
+    assert_refused(STATUS_PERIOD_TOO_SHORT, "v4294967295");
+    assert_refused(STATUS_VELOCITY_ZERO, "m200v0");
+    assert_refused(STATUS_PERIOD_TOO_SHORT, "m200vc1a5");
+    assert_refused(STATUS_PERIOD_TOO_SHORT, "m200v200000d5");
     TEST_ASSERT_EQUAL(STATUS_OK, read("vc3"));
     settings.pulse_us = 1;
     TEST_ASSERT_EQUAL(STATUS_OK, read("vc2"));
-    refuse(STATUS_PERIOD_TOO_SHORT, "vc1");
+    assert_refused(STATUS_PERIOD_TOO_SHORT, "vc1");
 }
 
 /* -- accel and decel -------------------------------------------------------------------------------------------------- */
@@ -281,11 +281,11 @@ static void test_ramp_values_have_two_decimals_below_100_and_none_from_100(void)
 /* ACC-003 */
 static void test_ramp_values_out_of_range_are_refused_with_the_range(void)
 {
-    refuse_range("0.01..999", "a1000");
-    refuse_range("0.01..999", "d1000.5");
-    refuse_range("0.01..999", "m200a4000000000");
-    refuse_range("0.01..999", "a.001");
-    refuse_range("0.01..999", "m200d0.009v50");
+    assert_refused_range("0.01..999", "a1000");
+    assert_refused_range("0.01..999", "d1000.5");
+    assert_refused_range("0.01..999", "m200a4000000000");
+    assert_refused_range("0.01..999", "a.001");
+    assert_refused_range("0.01..999", "m200d0.009v50");
 }
 
 /* ACC-006 */
@@ -350,14 +350,14 @@ static void test_numbers_are_taken_up_to_their_limit_and_refused_beyond(void)
     TEST_ASSERT_EQUAL_UINT32(4294967295u, command->count);
     TEST_ASSERT_EQUAL_UINT8(255, command->extra_pulses);
     TEST_ASSERT_EQUAL_UINT32(4294967295u, command->start_wait_us);
-    refuse(STATUS_NUMBER_TOO_LARGE, "m4294967296");
-    refuse(STATUS_NUMBER_TOO_LARGE, "m200t4294967296");
-    refuse(STATUS_NUMBER_TOO_LARGE, "m200vc99999999999");
-    refuse(STATUS_NUMBER_TOO_LARGE, "v4294967296");
-    refuse_range("0..255", "m200u256");
-    refuse_range("0..255", "m200v50u4294967295");
-    refuse_range("0..1", "m200l2");
-    refuse_range("0..1", "m200s2a5");
+    assert_refused(STATUS_NUMBER_TOO_LARGE, "m4294967296");
+    assert_refused(STATUS_NUMBER_TOO_LARGE, "m200t4294967296");
+    assert_refused(STATUS_NUMBER_TOO_LARGE, "m200vc99999999999");
+    assert_refused(STATUS_NUMBER_TOO_LARGE, "v4294967296");
+    assert_refused_range("0..255", "m200u256");
+    assert_refused_range("0..255", "m200v50u4294967295");
+    assert_refused_range("0..1", "m200l2");
+    assert_refused_range("0..1", "m200s2a5");
 }
 
 static void test_letters_and_signs_out_of_place_are_refused(void)
@@ -367,33 +367,33 @@ static void test_letters_and_signs_out_of_place_are_refused(void)
                                         "m200t.5", "m200vc5.5", "m200!",  "m200[",  "m200`",   "m200\xE9", "m200\xFF",
                                         "v50a1",   "a5d5",     "v50x",   "a-1",    "v5l1",    "d5p",     "m200v5cv6"};
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
-        refuse(STATUS_SYNTAX, texts[i]);
+        assert_refused(STATUS_SYNTAX, texts[i]);
     }
 }
 
 static void test_a_missing_number_is_refused_where_one_is_needed(void)
 {
-    refuse(STATUS_NUMBER_MISSING, "vc");
-    refuse(STATUS_NUMBER_MISSING, "m200vc");
-    refuse(STATUS_NUMBER_MISSING, "m200vca5");
-    refuse(STATUS_NUMBER_MISSING, "a.");
-    refuse(STATUS_NUMBER_MISSING, "m200d.u5");
+    assert_refused(STATUS_NUMBER_MISSING, "vc");
+    assert_refused(STATUS_NUMBER_MISSING, "m200vc");
+    assert_refused(STATUS_NUMBER_MISSING, "m200vca5");
+    assert_refused(STATUS_NUMBER_MISSING, "a.");
+    assert_refused(STATUS_NUMBER_MISSING, "m200d.u5");
 }
 
 static void test_continuous_motion_is_not_available_yet(void)
 {
-    refuse(STATUS_NOT_YET, "m");
-    refuse(STATUS_NOT_YET, "m-");
-    refuse(STATUS_NOT_YET, "m0");
-    refuse(STATUS_NOT_YET, "m-0v50");
-    refuse(STATUS_NOT_YET, "mv120a.8d1.2");
-    refuse(STATUS_SYNTAX, "mv120k");
+    assert_refused(STATUS_NOT_YET, "m");
+    assert_refused(STATUS_NOT_YET, "m-");
+    assert_refused(STATUS_NOT_YET, "m0");
+    assert_refused(STATUS_NOT_YET, "m-0v50");
+    assert_refused(STATUS_NOT_YET, "mv120a.8d1.2");
+    assert_refused(STATUS_SYNTAX, "mv120k");
 }
 
 static void test_the_first_error_of_a_line_is_the_one_that_is_told(void)
 {
-    refuse(STATUS_NUMBER_TOO_LARGE, "m99999999999k");
-    refuse(STATUS_RANGE, "m200u300v0");
+    assert_refused(STATUS_NUMBER_TOO_LARGE, "m99999999999k");
+    assert_refused(STATUS_RANGE, "m200u300v0");
 }
 
 /* Any 200,000 lines of the syntax's characters: nothing but a status comes out, and a refused one changes nothing. */
