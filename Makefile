@@ -115,12 +115,13 @@ CHECKS := \
 AVR_MCU := -mmcu=atmega328p
 AVR_WARNINGS := -Wall -Wextra -Wconversion -Wshadow -Wlogical-op -Wstrict-prototypes -Wstack-usage=128 -Werror
 # What makes this image smaller, measured with avr-gcc 5.4; the last one costs a kilobyte with 14.2.
-AVR_VERSION := $(shell $(AVR)gcc -dumpversion 2>/dev/null)
-AVR_SMALLER := -Os -mcall-prologues -mstrict-X -fno-gcse -fno-move-loop-invariants -fno-ipa-sra \
+# (Not := : `make setup firmware` installs the compiler first.)
+AVR_VERSION = $(shell $(AVR)gcc -dumpversion 2>/dev/null)
+AVR_SMALLER = -Os -mcall-prologues -mstrict-X -fno-gcse -fno-move-loop-invariants -fno-ipa-sra \
     -flto -fno-tree-forwprop -fno-tree-dominator-opts -fno-inline-small-functions -fira-algorithm=priority \
     -fno-tree-sink -fno-ssa-phiopt -fweb -frename-registers -fno-tree-copy-prop -fno-tree-coalesce-vars \
     -flto-partition=none $(if $(filter 5.%,$(AVR_VERSION)),-fno-toplevel-reorder)
-AVR_CFLAGS := $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 $(AVR_SMALLER) -g -ffunction-sections -fdata-sections -fshort-enums \
+AVR_CFLAGS = $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 $(AVR_SMALLER) -g -ffunction-sections -fdata-sections -fshort-enums \
     -fstack-usage -Ifirmware $(AVR_WARNINGS)
 # The segment ring stands alone in the first 256 bytes of RAM, so that the step interrupt addresses it with one byte.
 AVR_LDFLAGS := $(AVR_MCU) -Wl,--gc-sections -mrelax -Wl,--section-start=.segments=0x800100 -Wl,-Tdata=0x800200

@@ -1,6 +1,6 @@
 /* See wide.h. Cycles with call and return: add, subtract 96; multiply about 20 + 45 per zero-free byte of x and 13 per
  * product of two bytes: 420 for a 32-bit x; divide about 140 per byte of the quotient; root 1,200; shift 70
- * per bit; copy 80. Little-endian, arguments by the avr-gcc calling convention. */
+ * per bit; copy 80; fraction 80. Little-endian, arguments by the avr-gcc calling convention. */
 
         .section .text.wide_copy, "ax", @progbits
         .global wide_copy
@@ -248,3 +248,46 @@ wide_bits:                      /* r24 x */
         dec     r24
         rjmp    2b
 3:      ret
+
+/* Products of bytes i of x and j of y with i + j >= 3, summed in r17 (lost), r26, r27, r30, r31. */
+.macro add_product x, y, a, b, c, d, e
+        mul     \x, \y
+        add     \a, r0
+        adc     \b, r1
+        .ifnb \c
+        adc     \c, r16
+        .endif
+        .ifnb \d
+        adc     \d, r16
+        .endif
+        .ifnb \e
+        adc     \e, r16
+        .endif
+.endm
+
+        .section .text.wide_fraction, "ax", @progbits
+        .global wide_fraction
+        .type wide_fraction, @function
+wide_fraction:                  /* r22-r25 x, r18-r21 y; returns r22-r25 */
+        push    r16
+        push    r17
+        clr     r16
+        clr     r17
+        mul     r24, r20
+        movw    r26, r0
+        mul     r25, r21
+        movw    r30, r0
+        add_product r22, r21, r17, r26, r27, r30, r31
+        add_product r23, r20, r17, r26, r27, r30, r31
+        add_product r24, r19, r17, r26, r27, r30, r31
+        add_product r25, r18, r17, r26, r27, r30, r31
+        add_product r23, r21, r26, r27, r30, r31
+        add_product r25, r19, r26, r27, r30, r31
+        add_product r24, r21, r27, r30, r31
+        add_product r25, r20, r27, r30, r31
+        clr     r1
+        movw    r22, r26
+        movw    r24, r30
+        pop     r17
+        pop     r16
+        ret

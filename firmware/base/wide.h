@@ -19,6 +19,7 @@ uint32_t wide_divide(wide_t *x, uint32_t divisor); /* x /= divisor, truncated; r
 uint32_t wide_root(const wide_t *x);               /* sqrt(x), truncated */
 uint8_t wide_bits(const wide_t *x);                /* of x without its leading zeros: 0..64 */
 void wide_shift(wide_t *x, uint8_t bits);          /* x >>= bits, without sign; bits < 64 */
+uint32_t wide_fraction(uint32_t x, uint32_t y_q32); /* x * y / 2^32, less up to 4: products of the low bytes are left out */
 #else
 static inline void wide_copy(wide_t *to, const wide_t *from)
 {
@@ -66,6 +67,14 @@ static inline uint8_t wide_bits(const wide_t *x)
 static inline void wide_shift(wide_t *x, uint8_t bits)
 {
     *x >>= bits;
+}
+static inline uint32_t wide_fraction(uint32_t x, uint32_t y_q32)
+{
+    uint64_t sum = 0; /* in 2^-8 */
+    for (int i = 0; i < 4; i++)
+        for (int j = 3 - i; j < 4; j++)
+            sum += (uint64_t)((x >> 8 * i & 0xFF) * (y_q32 >> 8 * j & 0xFF)) << 8 * (i + j - 3);
+    return (uint32_t)(sum >> 8);
 }
 #endif
 

@@ -1,8 +1,7 @@
 /* See ramp.h and docs/design.md. All arithmetic is in integers.
- * Harmonic: the interval at both ends of a group and in its middle, each by a division; the parabola through them gives
- * the sum and the shape.
- * Linear: the time from standstill at a group's beginning, middle and end, each by a root. Differences of such times do
- * not drift. */
+ * Harmonic: the interval in a group's middle, by a division; the law's series around it gives the sum.
+ * Linear: the time from standstill at a group's end, by a root. Differences of such times do not drift.
+ * How much the law's variable changes in the group, as a part of its value, gives the shape of either. */
 #include "motion/ramp.h"
 #include "base/inline.h"
 #include "base/wide.h"
@@ -12,7 +11,6 @@
 #define GROUP_MAX_LOG2 9u
 #define RUN_MAX_LOG2 7u
 #define ALIGN_TICKS 600u /* from here on there is time for small groups */
-#define LONG_TICKS 4096u /* groups are half as wide, so that the parabola is within a tenth of a tick */
 #define GROUP_MAX_TICKS 49152u /* so that 32 bits hold their sum, and a command can be cut soon */
 #define STEEP_BITS 36u /* of C: first intervals below 16,384 ticks */
 /* Runs: the interrupt's cycles for two segments, the planner's, and as much for others; and those of each pulse. */
@@ -54,14 +52,6 @@ static NOINLINE ramp_time_t interval_at_twice(const ramp_constants_t *constants,
     return t;
 }
 
-/* The same in one number, where that is below 65,536 ticks. */
-static NOINLINE uint32_t interval_q16(const ramp_constants_t *constants, uint32_t v2)
-{
-    wide_t q16;
-    divide_k(&q16, constants, v2);
-    return wide_half(&q16, 0);
-}
-
 ramp_time_t ramp_interval(const ramp_constants_t *constants, uint32_t v)
 {
     return interval_at_twice(constants, 2 * v);
@@ -96,6 +86,65 @@ static void begin(ramp_t *ramp, bool linear, bool faster)
     memset(ramp, 0, sizeof *ramp);
     ramp->linear = linear;
     ramp->faster = faster;
+    ramp->most_log2 = GROUP_MAX_LOG2;
+}
+
+/* -- groups ------------------------------------------------------------------------------------------------------ */
+
+/* 2^24 * part / whole. part < whole. */
+static NOINLINE uint32_t ratio_q24(uint32_t part, uint8_t part_shift, uint32_t whole)
+{
+    wide_t quotient = (wide_t)part << 24;
+    wide_shift(&quotient, part_shift);
+    wide_divide(&quotient, whole);
+    return wide_half(&quotient, 0);
+}
+
+/* By what power of two the law's variable may change in a group, so that the parabola stays within a tenth of a tick of
+ * the law. Steep ramps need groups that last as long as it takes to plan them. */
+static uint8_t part_log2(const ramp_t *ramp)
+{
+    uint16_t ticks = ramp->ticks;
+    return ramp->steep || ticks < 128 ? 2 : ticks < 1024 ? 3 : ticks < 4096 ? 4 : 5;
+}
+
+/* The next group's size: a power of two whose change, of so much a pulse, and duration are within the limits. From the
+ * last group's on, because that is nearly always it. */
+static NOINLINE void choose_group(ramp_t *ramp, uint32_t change, uint32_t most_change, uint32_t left)
+{
+    uint8_t log2 = ramp->group_log2;
+    uint32_t ticks = ramp->ticks;
+    if (!ramp->faster)
+        ticks += ticks >> 2; /* they grow */
+    change <<= log2;
+    ticks <<= log2;
+    while (log2 && (change > most_change || ticks > GROUP_MAX_TICKS || left >> log2 == 0)) {
+        change >>= 1;
+        ticks >>= 1;
+        log2--;
+    }
+    /* Speeding up, groups are made larger where the pulses left can be divided by it: small groups then come while there
+     * is time for them, not at the ramp's end. */
+    uint16_t align = ramp->faster && ramp->ticks >= ALIGN_TICKS ? (uint16_t)left : 0;
+    while (log2 < ramp->most_log2 && 2 * change <= most_change && 2 * ticks <= GROUP_MAX_TICKS && left >> log2 > 1 &&
+           (align & ((2u << log2) - 1)) == 0) {
+        change *= 2;
+        ticks *= 2;
+        log2++;
+    }
+    ramp->group_log2 = log2;
+}
+
+/* The intervals of a group whose mean is mean_q16: as those of the law, whose variable changes by part / 2^32 of its
+ * value in the group's middle. Returns mean * part^2. */
+static uint32_t shape(ramp_t *ramp, uint32_t mean_q16, uint32_t part)
+{
+    uint32_t slope = wide_fraction(mean_q16, part);
+    uint32_t curve = wide_fraction(slope, part);
+    slope += wide_fraction(curve, part) >> 2; /* from end to end */
+    ramp->slope_q16 = (int32_t)(ramp->faster ? 0u - slope : slope);
+    ramp->shaped = true;
+    return curve;
 }
 
 /* -- harmonic ---------------------------------------------------------------------------------------------------- */
@@ -106,72 +155,40 @@ void ramp_begin_harmonic(ramp_t *ramp, const ramp_constants_t *constants, uint32
     begin(ramp, false, faster);
     ramp->u.harmonic.next2 = 2 * v_first;
     ramp->u.harmonic.cap2 = 2 * v_cap;
-    ramp->u.harmonic.step = step;
+    ramp->u.harmonic.step2 = 2 * step;
     ramp->steep = step > (uint32_t)wide_from_byte(&constants->k2_q16, 3) >> 10; /* K / 2^17 */
+    set_ticks(ramp, interval_at_twice(constants, 2 * (v_first < v_cap ? v_first : v_cap)).ticks);
 }
 
 static void harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, uint32_t left, ramp_time_t *sum)
 {
-    uint32_t next2 = ramp->u.harmonic.next2;
-    uint32_t step = ramp->u.harmonic.step;
+    uint32_t first2 = ramp->u.harmonic.next2;
     uint32_t cap2 = ramp->u.harmonic.cap2;
-    bool capped = next2 > cap2;
-    uint32_t first = ramp->u.harmonic.next_q16;
-    ramp->u.harmonic.next_q16 = 0;
-    if (first && !capped)
-        set_q16(sum, first);
-    else
-        *sum = interval_at_twice(constants, capped ? cap2 : next2);
-    uint32_t ticks = sum->ticks;
-    /* A group changes the velocity by a 16th at most, or a quarter: steep ones have to last as long as it takes to plan
-     * them. */
-    uint32_t limit = capped ? (next2 - cap2) >> 1 : next2 >> (ramp->steep ? 3 : 5);
-    if (ticks >= LONG_TICKS)
-        limit >>= 1;
-    uint8_t log2 = 0;
-    /* Speeding up, groups are made larger where the pulses left can be divided by it: small groups then come while there
-     * is time for them, not at the ramp's end. */
-    uint16_t align = ramp->faster && ramp->ticks >= ALIGN_TICKS ? (uint16_t)left : 0;
-    while (log2 < GROUP_MAX_LOG2 && 2 * step <= limit && 2 * ticks <= GROUP_MAX_TICKS && left >= 2u << log2 &&
-           (align & ((2u << log2) - 1)) == 0) {
-        step *= 2;
-        ticks *= 2;
-        log2++;
+    uint32_t step2 = ramp->u.harmonic.step2;
+    bool capped = first2 > cap2;
+    choose_group(ramp, step2, capped ? first2 - cap2 : first2 >> part_log2(ramp), left);
+    uint8_t log2 = ramp->group_log2;
+    uint32_t change2 = step2 << log2;
+    uint32_t to_centre2 = (change2 - step2) >> 1;
+    uint32_t centre2 = ramp->faster ? first2 + to_centre2 : first2 - to_centre2;
+    ramp->u.harmonic.next2 = ramp->faster ? first2 + change2 : first2 - change2;
+    if (capped) {
+        centre2 = cap2;
+        change2 = 0;
     }
-    if (!ramp->faster)
-        step = 0u - step;
-    ramp->u.harmonic.next2 = next2 + 2 * step;
+    *sum = interval_at_twice(constants, centre2);
     if (log2) {
-        first = sum->ticks << 16 | sum->frac_q16;
-        uint32_t middle = first;
-        uint32_t end = first;
-        if (!capped) {
-            middle = interval_q16(constants, next2 + step);
-            end = interval_q16(constants, next2 + 2 * step);
-            ramp->u.harmonic.next_q16 = end;
-        }
-        uint32_t change = end - first;
-        uint32_t curve = 2 * (first - middle + end - middle);
-        if ((int32_t)curve < 0)
-            curve = 0; /* hardly any: rounded */
+        uint32_t mean = sum->ticks << 16 | sum->frac_q16;
+        uint32_t part = ratio_q24(change2, 0, centre2) << 8;
+        uint32_t curve = shape(ramp, mean, part);
+        /* The mean of 1 / (1 + x) over the pulses, x from -part / 2 to part / 2, n of them:
+         * 1 + (1 - 1 / n^2) / 12 * (part^2 + 3 / 20 * part^4 * (1 - 7 / 3 n^2)) */
+        uint32_t sum2 = (wide_fraction(wide_fraction(curve, part), part) * 19) >> 7;
+        sum2 += curve - ((sum2 * 37 >> 4) >> log2 >> log2);
+        mean += wide_fraction(sum2 - (sum2 >> log2 >> log2), 357913941u); /* 2^32 / 12 */
         ramp->curve_q16 = (int32_t)(2 * curve);
-        ramp->slope_q16 = (int32_t)(change - (curve >> log2));
-        /* The mean over the pulses: m - (e - f) / 2n + c / 12 + c / 6n^2 */
-        middle -= (uint32_t)((int32_t)change >> log2 >> 1);
-        if (ramp->steep) {
-            /* ... - c^2 / 120 m (1 - 1 / n^2) (1 - 4 / n^2), the fourth derivative's part */
-            uint16_t curve_q4 = (uint16_t)(curve >> 12);
-            uint32_t sixty = (middle >> 16) * 60u;
-            uint32_t part = ((uint32_t)curve_q4 * curve_q4 + sixty) / (2 * sixty) << 8;
-            part -= (5 * part - (4 * part >> 2 * log2)) >> 2 * log2;
-            middle -= part;
-        }
-        curve += curve >> 2 * log2 << 1;
-        middle += (curve >> 8) * 5461u >> 8; /* 65536 / 12 */
-        set_q16(sum, middle << log2);
-        ramp->shaped = true;
+        set_q16(sum, mean << log2);
     }
-    ramp->group_log2 = log2;
 }
 
 /* -- linear ------------------------------------------------------------------------------------------------------ */
@@ -250,7 +267,6 @@ void ramp_begin_linear(ramp_t *ramp, const wide_t *c_q8, const wide_t *t_q4, uin
     if (start_bits > bits)
         bits = start_bits;
     uint8_t halved = bits > 62 ? (uint8_t)(bits - 61) / 2 : 0;
-    ramp->u.linear.most_log2 = GROUP_MAX_LOG2;
     ramp->u.linear.halved = halved;
     wide_shift(c, (uint8_t)(2 * halved));
     wide_shift(&t, halved);
@@ -278,27 +294,24 @@ void ramp_begin_linear(ramp_t *ramp, const wide_t *c_q8, const wide_t *t_q4, uin
     set_ticks(ramp, between(ramp, &ramp->u.linear.t, &next) >> 4);
 }
 
-/* The largest group of so many ticks a pulse that lasts no longer than `limit`. */
-static uint8_t widest(uint32_t ticks, uint32_t limit, uint32_t left, uint8_t most_log2)
-{
-    uint8_t log2 = 0;
-    for (; log2 < most_log2 && ticks <= limit >> 1 && left >= 2u << log2; log2++)
-        ticks *= 2;
-    return log2;
-}
-
 /* Beyond the bound all intervals are equal. */
 static void bounded_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum)
 {
-    uint32_t ticks = ramp->u.linear.bound.ticks;
-    uint8_t log2 = widest(ticks, GROUP_MAX_TICKS, left, GROUP_MAX_LOG2);
-    uint32_t frac = (uint32_t)ramp->u.linear.bound.frac_q16 << log2;
-    sum->ticks = (ticks << log2) + (frac >> 16);
+    const ramp_time_t *bound = &ramp->u.linear.bound;
+    set_ticks(ramp, bound->ticks);
+    choose_group(ramp, 0, 0, left);
+    uint8_t log2 = ramp->group_log2;
+    uint32_t frac = (uint32_t)bound->frac_q16 << log2;
+    sum->ticks = (bound->ticks << log2) + (frac >> 16);
     sum->frac_q16 = (uint16_t)frac;
-    ramp->group_log2 = log2;
     ramp->slope_q16 = 0;
     ramp->curve_q16 = 0;
     ramp->shaped = log2 != 0;
+}
+
+static bool is_longer(const ramp_time_t *a, const ramp_time_t *b)
+{
+    return a->ticks > b->ticks || (a->ticks == b->ticks && a->frac_q16 > b->frac_q16);
 }
 
 static void linear_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum)
@@ -309,67 +322,42 @@ static void linear_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum)
     }
     bool faster = ramp->faster;
     uint8_t halved = ramp->u.linear.halved;
-    uint32_t span = ramp->ticks;
-    /* Part of the time from standstill. */
-    uint32_t limit = ramp->u.linear.t.whole;
-    limit = limit >> (31 - halved) ? GROUP_MAX_TICKS : limit << halved >> (ramp->steep ? 6 : 8);
-    if (limit > GROUP_MAX_TICKS)
-        limit = GROUP_MAX_TICKS;
-    if (span >= LONG_TICKS)
-        limit >>= 1;
-    uint8_t log2 = widest(span, limit, left, ramp->u.linear.most_log2);
+    const ramp_time_t *bound = &ramp->u.linear.bound;
     ramp_root_t begin = ramp->u.linear.t;
-    ramp_root_t end;
-    wide_t step = (uint16_t)(1u << log2 >> (log2 != 0));
-    wide_t half;
-    wide_multiply(&half, &step, &ramp->u.linear.c);
-    add_if(&ramp->u.linear.x, &half, faster);
-    root_at(ramp, &end);
-    uint32_t ticks_q4 = between(ramp, &begin, &end);
-    while (log2) {
-        ramp_root_t middle = end;
-        add_if(&ramp->u.linear.x, &half, faster);
-        root_at(ramp, &end);
-        uint32_t second_q4 = between(ramp, &middle, &end);
-        uint32_t mean1 = ticks_q4 << (13 - log2);
-        uint32_t mean2 = second_q4 << (13 - log2);
-        int32_t slope = (int32_t)(mean2 - mean1) * 2;
-        uint32_t bound = ramp->u.linear.bound.ticks;
-        bound = bound > UINT16_MAX ? UINT32_MAX : bound << 16 | ramp->u.linear.bound.frac_q16;
-        uint32_t last = mean2 + (uint32_t)(slope >> 2);
-        if (!(faster ? last < bound : last > bound)) {
-            /* 3 r^2 times the interval, r the relative change */
-            uint32_t slope_q8 = magnitude(slope) >> 8;
-            ramp->curve_q16 = (int32_t)(slope_q8 * 3 * (slope_q8 / ((mean1 >> 16) + 1)));
-            ramp->slope_q16 = slope;
-            ramp->shaped = true;
-            ticks_q4 += second_q4;
-            break;
-        }
-        /* The bound is reached in it: half of it. */
-        ramp->u.linear.most_log2 = --log2;
-        add_if(&ramp->u.linear.x, &half, !faster);
-        end = middle;
+    uint32_t limit = begin.whole;
+    limit = limit >> (31 - halved) ? GROUP_MAX_TICKS : limit << halved >> 4 >> part_log2(ramp);
+    choose_group(ramp, ramp->ticks, limit, left);
+    wide_t x;
+    wide_copy(&x, &ramp->u.linear.x);
+    for (;;) {
+        uint8_t log2 = ramp->group_log2;
+        wide_t n = (uint16_t)(1u << log2);
+        wide_t change;
+        wide_multiply(&change, &n, &ramp->u.linear.c);
+        add_if(&ramp->u.linear.x, &change, faster);
+        ramp_root_t *end = &ramp->u.linear.t;
+        root_at(ramp, end);
+        uint32_t ticks_q4 = between(ramp, &begin, end);
+        sum->ticks = ticks_q4 >> 4;
+        sum->frac_q16 = (uint16_t)(ticks_q4 << 12);
+        ramp_time_t last = *sum;
         if (log2) {
-            wide_shift(&half, 1);
-            add_if(&ramp->u.linear.x, &half, !faster);
-            root_at(ramp, &end);
-            ticks_q4 = between(ramp, &begin, &end);
+            uint32_t mean = ticks_q4 << (12 - log2);
+            ramp->curve_q16 =
+                (int32_t)(3 * shape(ramp, mean, ratio_q24(ticks_q4, halved, (begin.whole >> 1) + (end->whole >> 1)) << 8));
+            set_q16(&last, mean + (uint32_t)(ramp->slope_q16 >> 1));
         }
+        if (faster ? !is_longer(bound, &last) : !is_longer(&last, bound))
+            return;
+        /* The bound is reached in it: half of it. */
+        if (log2 == 0)
+            break;
+        ramp->most_log2 = --ramp->group_log2;
+        wide_copy(&ramp->u.linear.x, &x);
     }
-    ramp->u.linear.t = end;
-    ramp->group_log2 = log2;
-    sum->ticks = ticks_q4 >> 4;
-    sum->frac_q16 = (uint16_t)(ticks_q4 << 12);
-    if (ramp->group_log2 == 0) {
-        uint32_t bound = ramp->u.linear.bound.ticks;
-        uint16_t bound_frac = ramp->u.linear.bound.frac_q16;
-        bool longer = sum->ticks > bound || (sum->ticks == bound && sum->frac_q16 > bound_frac);
-        if (faster ? !longer : longer) {
-            ramp->u.linear.bounded = true;
-            *sum = ramp->u.linear.bound;
-        }
-    }
+    ramp->u.linear.bounded = true;
+    ramp->most_log2 = GROUP_MAX_LOG2;
+    *sum = *bound;
 }
 
 /* -- both -------------------------------------------------------------------------------------------------------- */

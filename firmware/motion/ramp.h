@@ -40,6 +40,7 @@ typedef struct {
     bool steep;         /* planning it takes as long as playing it, or nearly */
     bool shaped;        /* slope and curve hold for the last group */
     uint8_t group_log2; /* of the last group's pulses */
+    uint8_t most_log2;  /* of a group's pulses: less where the bound is near */
     uint8_t run_log2;   /* of the pulses of a run that the group is divided into */
     uint16_t ticks;     /* interval in the last group, at most 65535 */
     /* How its intervals follow each other: by a parabola with this change (slope) from its beginning to its end, and
@@ -48,10 +49,9 @@ typedef struct {
     int32_t curve_q16;
     union {
         struct {
-            uint32_t next2;    /* twice the velocity of the next pulse */
-            uint32_t cap2;     /* never above */
-            uint32_t step;     /* change of velocity per pulse */
-            uint32_t next_q16; /* interval after the next pulse; 0: not known */
+            uint32_t next2; /* twice the velocity of the next pulse */
+            uint32_t cap2;  /* never above */
+            uint32_t step2; /* change per pulse */
         } harmonic;
         struct {
             wide_t x;          /* square of the time from standstill at the next pulse, in units of 2^halved / 16 ticks */
@@ -60,7 +60,6 @@ typedef struct {
             ramp_time_t bound; /* no interval above while slowing, none below while speeding up */
             bool bounded;      /* it has been reached: all that is left is equal */
             uint8_t halved;    /* how often units were doubled so that x fits */
-            uint8_t most_log2; /* of a group's pulses: less where the bound is near */
         } linear;
     } u;
 } ramp_t;

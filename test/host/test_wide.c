@@ -79,6 +79,20 @@ static void test_a_factor_may_be_multiplied_by_itself(void)
     TEST_ASSERT_TRUE(product == 0xFFFFFFFE00000001u);
 }
 
+static void test_a_fraction_is_the_upper_half_of_the_product_or_up_to_four_less(void)
+{
+    uint64_t state = 3;
+    for (uint16_t i = 0; i < 500; i++) {
+        uint32_t x = (uint32_t)next_value(&state), y = (uint32_t)next_value(&state);
+        uint32_t exact = (uint32_t)((uint64_t)x * y >> 32);
+        uint32_t less = exact - wide_fraction(x, y);
+        TEST_ASSERT_LESS_OR_EQUAL_UINT32(4, less);
+    }
+    TEST_ASSERT_EQUAL_UINT32(0x40000000u, wide_fraction(0x80000000u, 0x80000000u));
+    TEST_ASSERT_EQUAL_UINT32(0xFFFFFFFBu, wide_fraction(UINT32_MAX, UINT32_MAX));
+    TEST_ASSERT_EQUAL_UINT32(0x00123456u, wide_fraction(0x12345600u, 0x01000000u));
+}
+
 static void test_32_bits_are_taken_from_any_of_the_lower_bytes(void)
 {
     wide_t x = 0x8877665544332211u;
@@ -99,6 +113,7 @@ int main(void)
     RUN_TEST(test_products_are_modulo_two_to_the_64);
     RUN_TEST(test_products_of_negative_numbers_are_right_modulo_two_to_the_64);
     RUN_TEST(test_a_factor_may_be_multiplied_by_itself);
+    RUN_TEST(test_a_fraction_is_the_upper_half_of_the_product_or_up_to_four_less);
     RUN_TEST(test_32_bits_are_taken_from_any_of_the_lower_bytes);
     return UNITY_END();
 }
