@@ -22,14 +22,6 @@
 /* Where periods are short there is no time to look at all this with interrupts off. */
 #define ARM_LEAST_TICKS 256
 
-/* The ring is one page of RAM (motion/segment.h): an offset is the low byte of the address. */
-static inline segment_t *segment_at(uint8_t offset)
-{
-    segment_t *segment;
-    __asm__("mov %A0, %1\n\tldi %B0, hi8(segments)" : "=b"(segment) : "r"(offset));
-    return segment;
-}
-
 /* Periods less one, from the bytes that are counted down: the low one 1..256 times, and so often 256 more. */
 static inline uint16_t less_one(uint8_t low, uint8_t high)
 {

@@ -1,4 +1,4 @@
-/* block_append() of block.h for the AVR. Cycles: about 300 a call, 40 a halving, 55 a run of one segment, 95 a run of two.
+/* block_append() of block.h for the AVR. Cycles: about 300 a call, 55 a run of one segment, 95 a run of two.
  * The C version in block.c is what runs on the host. */
 #include "motion/block_offsets.h"
 #include "motion/segment.h"
@@ -59,53 +59,7 @@ saved:
         ldd     PULSES, Y + BLOCK_PULSES
         ldd     FLAGS, Y + BLOCK_FLAGS
         ldd     SHAPE, Y + BLOCK_SHAPE
-        ldd     r25, Y + BLOCK_HALVINGS
-        std     Y + BLOCK_HALVINGS, r1
-        tst     r25
-        breq    3f
-2:      movw    r22, SLOPE0             /* top -= slope / 4 */
-        movw    r26, SLOPE2
-        asr     r27
-        ror     r26
-        ror     r23
-        ror     r22
-        asr     r27
-        ror     r26
-        ror     r23
-        ror     r22
-        sub     TOP0, r22
-        sbc     TOP1, r23
-        sbc     TOP2, r26
-        sbc     TOP3, r27
-        asr     CURVE3                  /* curve /= 4 */
-        ror     CURVE2
-        ror     CURVE1
-        ror     CURVE0
-        asr     CURVE3
-        ror     CURVE2
-        ror     CURVE1
-        ror     CURVE0
-        sub     SLOPE0, CURVE0          /* slope = (slope - curve) / 2 */
-        sbc     SLOPE1, CURVE1
-        sbc     SLOPE2, CURVE2
-        sbc     SLOPE3, CURVE3
-        asr     SLOPE3
-        ror     SLOPE2
-        ror     SLOPE1
-        ror     SLOPE0
-        dec     r25
-        brne    2b
-        movw    r22, CURVE0             /* from the first run's middle to its end: slope += curve / 2 */
-        movw    r26, CURVE2
-        asr     r27
-        ror     r26
-        ror     r23
-        ror     r22
-        add     SLOPE0, r22
-        adc     SLOPE1, r23
-        adc     SLOPE2, r26
-        adc     SLOPE3, r27
-3:      ldi     r31, hi8(segments)
+        ldi     r31, hi8(segments)
         lds     r30, step_head
 
 next_run:

@@ -12,7 +12,6 @@ CHECK(CARRY, carry_q16);
 CHECK(WIDTH, width_ticks);
 CHECK(RUNS, runs);
 CHECK(PULSES, pulses);
-CHECK(HALVINGS, halvings);
 CHECK(FLAGS, flags);
 CHECK(SHAPE, shape);
 #else
@@ -34,14 +33,6 @@ static void append(const block_t *block, uint8_t periods, uint16_t top)
 
 void block_append(block_t *block)
 {
-    /* Of both halves of a parabola the first one. */
-    for (; block->halvings; block->halvings--) {
-        block->top_q16 -= (uint32_t)(block->slope_q16 >> 2);
-        block->slope_q16 = (block->slope_q16 - (block->curve_q16 >> 2)) >> 1;
-        block->curve_q16 >>= 2;
-        if (block->halvings == 1)
-            block->slope_q16 += block->curve_q16 >> 1; /* at the first run's end, not in its middle */
-    }
     while (block->runs && (uint8_t)(step_head - step_tail) <= BLOCK_RING_MOST_BYTES) {
         uint32_t x = block->top_q16;
         if (!(block->shape & BLOCK_SPLIT)) {
@@ -60,7 +51,7 @@ void block_append(block_t *block)
                 append(block, longer, (uint16_t)(top + 1));
         }
         block->top_q16 += (uint32_t)block->slope_q16;
-        block->slope_q16 += block->curve_q16;
+        block->slope_q16 = (int32_t)((uint32_t)block->slope_q16 + (uint32_t)block->curve_q16); /* may wrap after the last */
         block->runs--;
     }
 }

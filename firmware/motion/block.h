@@ -29,7 +29,6 @@ typedef struct {
     uint16_t width_ticks; /* of a pulse */
     uint8_t runs;      /* still to be appended */
     uint8_t pulses;    /* of a run */
-    uint8_t halvings;  /* until the first run has been appended: the parabola is that of 2^halvings runs together */
     uint8_t flags;     /* of their segments */
     uint8_t shape;     /* BLOCK_* bits */
 } block_t;

@@ -9,9 +9,8 @@
 #define BLOCK_WIDTH 14
 #define BLOCK_RUNS 16
 #define BLOCK_PULSES 17
-#define BLOCK_HALVINGS 18
-#define BLOCK_FLAGS 19
-#define BLOCK_SHAPE 20
+#define BLOCK_FLAGS 18
+#define BLOCK_SHAPE 19
 
 #define BLOCK_FASTER_BIT 0
 #define BLOCK_SPLIT_BIT 1

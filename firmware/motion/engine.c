@@ -27,7 +27,6 @@
 #define JOIN_SOON_TICKS 160000u   /* before the tail: when that is done at the earliest */
 #define START_TICKS 12000u       /* in the ring before the timer runs */
 #define START_PERIODS 4u         /* and at least so many: a segment is loaded when the one before it begins */
-#define REST_PULSES 64u          /* the least that is left for a fast ramp's last run */
 #define RING_REFILL 12u          /* free segments for a block to be gone on with */
 #define RING_RESERVE 4u          /* segments that one step of emission may need */
 
@@ -42,6 +41,7 @@ typedef enum {
 } stage_t;
 
 static profile_basis_t basis;
+static uint16_t width_ticks; /* of a pulse */
 static motion_command_t command; /* being emitted or played */
 static profile_t profile;        /* what is left of it to be emitted */
 static motion_command_t next;    /* taken, not begun */
@@ -78,11 +78,6 @@ static uint32_t v_in_play;
 static uint32_t in_play_cycle_us; /* 0: follows from v_in_play */
 static bool single;               /* the ring plays single pulses */
 
-static uint16_t pulse_width_ticks(void)
-{
-    return (uint16_t)settings.pulse_us * TICKS_PER_US;
-}
-
 static bool dir_level(bool ccw)
 {
     return ccw != (settings.cw_level != 0);
@@ -110,15 +105,11 @@ void engine_init(void)
     profile_basis(&basis, settings.steps_per_rev, settings.ustep, settings.slow_rpm);
     v_in_play = basis.v_slow;
     certain_centi = (130000000u >> basis.factor_log2) / basis.steps_per_rev;
+    width_ticks = (uint16_t)settings.pulse_us * TICKS_PER_US;
     step_port_init();
 }
 
 /* -- the ring -------------------------------------------------------------------------------------------------- */
-
-static segment_t *segment_at(uint8_t offset)
-{
-    return &segments[offset / SEGMENT_BYTES];
-}
 
 static uint8_t early_periods(uint8_t flags)
 {
@@ -260,7 +251,7 @@ static void push(uint16_t periods, uint16_t top, bool pulse, motion_state_t stat
         top = SEGMENT_EARLY1_BELOW_TICKS - 1;
     }
     s->top = top;
-    s->match = pulse ? (uint16_t)(top - pulse_width_ticks()) : SEGMENT_SILENT;
+    s->match = pulse ? (uint16_t)(top - width_ticks) : SEGMENT_SILENT;
     s->count_low = (uint8_t)counted;
     s->count_high = (uint8_t)((uint16_t)(counted - 1) >> 8);
     s->flags = flags;
@@ -391,8 +382,6 @@ static void begin_ramp(motion_state_t state)
     if (ramp_state == state)
         return;
     ramp_state = state;
-    block.runs = 0;
-    block.shape = BLOCK_SPLIT;
     if (state == MOTION_ACCEL)
         profile_begin_accel(&profile, &basis, &ramp);
     else
@@ -439,61 +428,48 @@ static void emit_block(uint32_t *left)
         carry_q16 += (int32_t)(block.shape & BLOCK_SPLIT ? block.carry_q16 : (uint32_t)block.carry_q16 * pulses);
 }
 
-/* Begins a block of a group in runs, with a mean interval in 1/65536 tick; no change within it. */
-static void begin_block(uint32_t mean_q16, uint8_t group_log2, uint8_t run_log2, motion_state_t state)
+/* What the block's runs do not say: the ticks carried so far, their segments' flags. */
+static void begin_block(bool faster)
 {
-    block.top_q16 = mean_q16 - 65536u;
-    block.slope_q16 = 0;
-    block.curve_q16 = 0;
+    bool split = block.top_q16 >> 16 >= BLOCK_SPLIT_TICKS - 1;
+    block.shape = (uint8_t)((faster ? BLOCK_FASTER : 0) | (split ? BLOCK_SPLIT : 0));
     block.carry_q16 = 0;
-    block.width_ticks = pulse_width_ticks();
-    block.flags = (uint8_t)(state | direction_flags(&command, false));
-    block.shape = mean_q16 >> 16 < BLOCK_SPLIT_TICKS ? 0 : BLOCK_SPLIT;
-    block.pulses = (uint8_t)(1u << run_log2);
-    block.halvings = (uint8_t)(group_log2 - run_log2);
-    block.runs = (uint8_t)(1u << block.halvings);
+    if (carry_q16 > 0) { /* otherwise it waits for a single interval */
+        uint32_t carry = (uint32_t)carry_q16;
+        uint32_t each = carry / block.pulses;
+        if (!split)
+            carry = each;
+        if (carry <= UINT16_MAX)
+            block.carry_q16 = (uint16_t)carry;
+        else
+            block.top_q16 += each / block.runs;
+        carry_q16 = 0;
+    }
+    block.width_ticks = width_ticks;
+    block.flags = (uint8_t)(ramp_state | direction_flags(&command, false));
 }
 
-/* The next intervals of a ramp. */
-static void emit_ramp(uint32_t *left, uint32_t at_most, motion_state_t state, bool faster)
+/* The next intervals of the ramp of `ramp_state`: pulses all alike, a block, or some of the former before a block. */
+static void emit_ramp(uint32_t *left, uint32_t at_most, bool faster)
 {
-    begin_ramp(state);
-    /* Where runs of a few pulses could not be reloaded in time, the last one is of many. */
-    bool fast = !(block.shape & BLOCK_SPLIT);
-    bool rest = fast && at_most < 2 * REST_PULSES;
-    bool plain = rest || ahead_ticks || dir_due || owed;
-    uint32_t kept = 0;
-    if (plain && !rest)
-        kept = at_most - 1;
-    else if (fast && !rest)
-        kept = REST_PULSES;
-    at_most -= kept;
+    if (ahead_ticks || dir_due || owed)
+        at_most = 1;
     uint32_t ticks = 0;
     uint8_t pulses = 0;
     do {
         ramp_time_t sum;
-        uint16_t group = ramp_next(&ramp, &basis.ramp, at_most, &sum);
-        if (ramp.shaped && !plain) {
-            begin_block((sum.ticks << 16 | sum.frac_q16) >> ramp.group_log2, ramp.group_log2, ramp.run_log2, state);
-            uint32_t carry = (uint32_t)carry_q16;
-            carry_q16 = 0;
-            if (block.shape & BLOCK_SPLIT && carry <= UINT16_MAX)
-                block.carry_q16 = (uint16_t)carry;
-            else
-                block.top_q16 += carry >> ramp.group_log2;
-            block.slope_q16 = ramp.slope_q16;
-            block.curve_q16 = ramp.curve_q16;
-            if (faster)
-                block.shape |= BLOCK_FASTER;
-            emit_block(left);
-            return;
+        uint16_t group = ramp_next(&ramp, &basis.ramp, at_most, &sum, &block);
+        if (block.runs) {
+            begin_block(faster);
+            break;
         }
         ticks += take_carry(sum.ticks, sum.frac_q16);
         pulses = (uint8_t)(pulses + group);
         at_most -= group;
-    } while (rest && at_most);
+    } while (ramp.rest && at_most);
     *left -= pulses;
-    emit_flat(pulses, ticks, state, faster);
+    if (pulses)
+        emit_flat(pulses, ticks, ramp_state, faster);
 }
 
 static void emit_cruise(uint32_t *left, uint32_t at_most)
@@ -523,17 +499,13 @@ static void emit_cruise(uint32_t *left, uint32_t at_most)
     uint8_t run_log2 = 3;
     while (run_log2 < 7 && ticks << run_log2 < CRUISE_GROUP_TICKS && run >> run_log2 > 1)
         run_log2++;
-    begin_block(ticks << 16 | (uint32_t)frac << 8, run_log2, run_log2, MOTION_CRUISE);
     run = (uint16_t)(run >> run_log2);
     block.runs = (uint8_t)(run > 255u ? 255u : run);
-    uint32_t carry = (uint32_t)carry_q16;
-    if (!(block.shape & BLOCK_SPLIT))
-        carry >>= run_log2;
-    if (carry <= UINT16_MAX) {
-        block.carry_q16 = (uint16_t)carry;
-        carry_q16 = 0;
-    }
-    emit_block(left);
+    block.pulses = (uint8_t)(1u << run_log2);
+    block.top_q16 = ((ticks - 1) << 16) | (uint32_t)frac << 8;
+    block.slope_q16 = 0;
+    block.curve_q16 = 0;
+    begin_block(false);
 }
 
 /* The interval after the last pulse of the command: body, then tail. */
@@ -549,7 +521,7 @@ static void begin_closing(void)
     } else {
         begin_ramp(state);
         ramp_time_t sum;
-        (void)ramp_next(&ramp, &basis.ramp, 1, &sum);
+        (void)ramp_next(&ramp, &basis.ramp, 1, &sum, &block);
         ticks = take_carry(sum.ticks, sum.frac_q16);
         chunks = ticks >> PROFILE_CHUNK_LOG2;
         ticks &= PROFILE_CHUNK_TICKS - 1;
@@ -603,12 +575,6 @@ static bool emit(void)
         return true;
     }
     profile_t *p = &profile;
-    if (block.runs) {
-        emit_block(ramp_state == MOTION_ACCEL    ? &p->accel_pulses
-                   : ramp_state == MOTION_CRUISE ? &p->cruise_pulses
-                                                 : &p->decel_pulses);
-        return true;
-    }
     switch (stage) {
     case STAGE_REST:
         return false;
@@ -623,17 +589,36 @@ static bool emit(void)
         return true;
     }
     case STAGE_RUN: {
-        uint32_t after_accel = p->cruise_pulses + p->decel_pulses;
-        if (p->accel_pulses + after_accel <= 1) {
-            begin_closing();
-        } else if (p->accel_pulses) {
-            emit_ramp(&p->accel_pulses, p->accel_pulses - (after_accel == 0), MOTION_ACCEL, p->faster);
+        uint32_t after = p->decel_pulses;
+        uint32_t *left = &p->decel_pulses;
+        motion_state_t state = MOTION_DECEL;
+        if (p->accel_pulses) {
+            after += p->cruise_pulses;
+            left = &p->accel_pulses;
+            state = MOTION_ACCEL;
         } else if (p->cruise_pulses) {
-            ramp_state = MOTION_CRUISE;
-            emit_cruise(&p->cruise_pulses, p->cruise_pulses - (p->decel_pulses == 0));
+            left = &p->cruise_pulses;
+            state = MOTION_CRUISE;
         } else {
-            emit_ramp(&p->decel_pulses, p->decel_pulses - 1, MOTION_DECEL, false);
+            after = 0;
         }
+        if (block.runs == 0) {
+            uint8_t kept = after == 0; /* for the closing interval */
+            if (*left <= kept) {
+                begin_closing();
+                return true;
+            }
+            uint32_t at_most = *left - kept;
+            if (state == MOTION_CRUISE) {
+                ramp_state = state;
+                emit_cruise(left, at_most);
+            } else {
+                begin_ramp(state);
+                emit_ramp(left, at_most, state == MOTION_ACCEL && p->faster);
+            }
+        }
+        if (block.runs)
+            emit_block(left);
         return true;
     }
     case STAGE_TAIL:
@@ -658,6 +643,18 @@ static bool emit(void)
     return false;
 }
 
+/* Nothing of the command is to be emitted any more, or joined to. */
+static void drop_emission(void)
+{
+    silence_chunks = 0;
+    piece_ticks = 0;
+    block.runs = 0;
+    ahead_ticks = 0;
+    ramp_state = MOTION_STANDBY;
+    tail_awaited = false;
+    tail_valid = false;
+}
+
 /* -- starting and joining ----------------------------------------------------------------------------------------- */
 
 static void begin_ring(void)
@@ -671,15 +668,10 @@ static void begin_ring(void)
     step_idle = 0;
     owed = 0;
     carry_q16 = 0;
-    ahead_ticks = 0;
-    silence_chunks = 0;
-    piece_ticks = 0;
-    block.runs = 0;
     dir_due = false;
-    tail_valid = false;
     joined = false;
     single = false;
-    ramp_state = MOTION_STANDBY;
+    drop_emission();
 }
 
 static void plan(void)
@@ -733,7 +725,7 @@ static void fill(void)
     uint8_t offset = step_head;
     uint32_t periods = 0;
     while ((ticks < START_TICKS || periods < START_PERIODS ||
-            (!playing && (ramp_state == MOTION_ACCEL || ramp_state == MOTION_DECEL) && (ramp.steep || !ramp.shaped))) &&
+            (!playing && (ramp_state == MOTION_ACCEL || ramp_state == MOTION_DECEL) && (ramp.steep || ramp.group_log2 == 0))) &&
            ring_free() >= RING_RESERVE && emit()) {
         for (; offset != step_head; offset = (uint8_t)(offset + SEGMENT_BYTES)) {
             uint16_t counted = counted_periods(segment_at(offset));
@@ -752,9 +744,9 @@ static void start_now(void)
     uint16_t certain = certain_ticks();
     if (command.start_wait_us < 4096u) {
         uint16_t lead = (uint16_t)(command.start_wait_us * TICKS_PER_US);
-        if (lead < DIR_SETUP_TICKS + pulse_width_ticks())
-            lead = (uint16_t)(DIR_SETUP_TICKS + pulse_width_ticks());
-        append(1, (uint16_t)(lead - 1), pulse_width_ticks(), flags);
+        if (lead < DIR_SETUP_TICKS + width_ticks)
+            lead = (uint16_t)(DIR_SETUP_TICKS + width_ticks);
+        append(1, (uint16_t)(lead - 1), width_ticks, flags);
         add_pulses(flags, 1);
         stage = STAGE_RUN;
         if (certain) {
@@ -853,9 +845,9 @@ static void join_next(void)
             done = step_port_extend(offset);
         } else {
             uint16_t top = (uint16_t)(segment_at(offset)->top + wait);
-            if (turns && top < TURN_TICKS + pulse_width_ticks())
-                top = (uint16_t)(TURN_TICKS + pulse_width_ticks());
-            done = step_port_arm(offset, top, (uint16_t)(top - pulse_width_ticks()), flags);
+            if (turns && top < TURN_TICKS + width_ticks)
+                top = (uint16_t)(TURN_TICKS + width_ticks);
+            done = step_port_arm(offset, top, (uint16_t)(top - width_ticks), flags);
         }
         if (!done)
             return; /* not at this moment */
@@ -863,19 +855,14 @@ static void join_next(void)
     }
     command = next;
     next_taken = false;
-    silence_chunks = 0;
-    piece_ticks = 0;
-    block.runs = 0;
-    ramp_state = MOTION_STANDBY;
     if (!timely) {
         if (step_idle)
             expire_gap();
         start_now();
         return;
     }
+    drop_emission();
     joined = true;
-    tail_awaited = false;
-    tail_valid = false;
     ended++;
     /* Longer than the gap the wait means a start from slow speed. */
     if (wait >> PROFILE_CHUNK_LOG2 >= closing_chunks && wait > (closing_chunks << PROFILE_CHUNK_LOG2) + closing_ticks)
@@ -988,12 +975,8 @@ static void halt(void)
     if (running())
         ended++;
     emitted = engine_position();
-    tail_awaited = false;
     playing = false;
-    tail_valid = false;
-    silence_chunks = 0;
-    piece_ticks = 0;
-    block.runs = 0;
+    drop_emission();
     stage = STAGE_REST;
     motion_state = MOTION_STANDBY;
 }
@@ -1042,12 +1025,7 @@ static uint32_t cut(void)
         return 0;
     emitted -= pulses_from((uint8_t)(offset + SEGMENT_BYTES));
     emitted -= signed_pulses(s, step_port_shorten(offset, left));
-    tail_awaited = false;
-    tail_valid = false;
-    silence_chunks = 0;
-    piece_ticks = 0;
-    block.runs = 0;
-    ahead_ticks = 0;
+    drop_emission();
     return interval_ticks;
 }
 
@@ -1112,7 +1090,7 @@ void engine_single_pulse(bool ccw)
     single = true;
     command.flags = ccw ? MOTION_CCW : 0;
     uint8_t flags = direction_flags(&command, true);
-    uint16_t width = pulse_width_ticks();
+    uint16_t width = width_ticks;
     append(1, (uint16_t)(TURN_TICKS + width - 1), width, flags);
     add_pulses(flags, 1);
     play();

@@ -17,7 +17,7 @@
 
 typedef enum { MOTION_STANDBY, MOTION_ACCEL, MOTION_CRUISE, MOTION_DECEL, MOTION_STOP } motion_state_t;
 
-void engine_init(void);
+void engine_init(void); /* takes over the settings: motor, microsteps, slow speed, pulse width */
 
 /* Whether this command could be executed: its period and pulse width fit, its count does not overflow. */
 status_t engine_check(const motion_command_t *command);

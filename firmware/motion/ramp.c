@@ -3,21 +3,23 @@
  * Linear: the time from standstill at a group's end, by a root. Differences of such times do not drift.
  * How much the law's variable changes in the group, as a part of its value, gives the shape of either. */
 #include "motion/ramp.h"
+#include "base/flash.h"
 #include "base/inline.h"
 #include "base/wide.h"
 #include "motion/block.h"
 #include <string.h>
 
 #define GROUP_MAX_LOG2 9u
-#define RUN_MAX_LOG2 7u
-#define ALIGN_TICKS 600u /* from here on there is time for small groups */
+#define RUN_MAX_PULSES 128u
+#define ODD_GROUP_LEAST 16u /* pulses of a group that are not a power of two */
+#define REST_PULSES 64u /* the least that is left for a fast ramp's last run */
 #define GROUP_MAX_TICKS 49152u /* so that 32 bits hold their sum, and a command can be cut soon */
 #define STEEP_BITS 36u /* of C: first intervals below 16,384 ticks */
 /* Runs: the interrupt's cycles for two segments, the planner's, and as much for others; and those of each pulse. */
 #define RUN_TICKS 500u
 #define RUN_STEEP_TICKS 1500u /* of steep ramps, where every segment counts */
 #define RUN_PULSE_TICKS 24u
-#define RUN_SLOPE_Q8 496u /* change of the interval within a run */
+#define RUN_SLOPE_Q6 124u /* change of the interval within a run */
 
 void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev)
 {
@@ -64,11 +66,6 @@ uint32_t ramp_velocity(const ramp_constants_t *constants, uint32_t ticks)
     return ((uint32_t)wide_from_byte(&v2_q16, 2) + 1) >> 1;
 }
 
-static NOINLINE uint32_t magnitude(int32_t x)
-{
-    return x < 0 ? 0u - (uint32_t)x : (uint32_t)x;
-}
-
 static void set_q16(ramp_time_t *time, uint32_t q16)
 {
     time->ticks = q16 >> 16;
@@ -87,64 +84,115 @@ static void begin(ramp_t *ramp, bool linear, bool faster)
     ramp->linear = linear;
     ramp->faster = faster;
     ramp->most_log2 = GROUP_MAX_LOG2;
+    ramp->run_pulses = 1;
 }
 
 /* -- groups ------------------------------------------------------------------------------------------------------ */
 
-/* 2^24 * part / whole. part < whole. */
-static NOINLINE uint32_t ratio_q24(uint32_t part, uint8_t part_shift, uint32_t whole)
+/* 2^32 * part / whole / 2^halved. The result is below 2^32. */
+static NOINLINE uint32_t ratio_q32(uint32_t part, uint8_t halved, uint32_t whole)
 {
-    wide_t quotient = (wide_t)part << 24;
-    wide_shift(&quotient, part_shift);
+    wide_t quotient = (wide_t)part << 32;
+    wide_shift(&quotient, halved);
     wide_divide(&quotient, whole);
     return wide_half(&quotient, 0);
 }
 
-/* By what power of two the law's variable may change in a group, so that the parabola stays within a tenth of a tick of
- * the law. Steep ramps need groups that last as long as it takes to plan them. */
+/* By what part of its value, a power of two, the law's variable may change in a group, so that the parabola stays within a
+ * tenth of a tick of the law. Steep ramps need groups that last as long as it takes to plan them. */
 static uint8_t part_log2(const ramp_t *ramp)
 {
     uint16_t ticks = ramp->ticks;
-    return ramp->steep || ticks < 128 ? 2 : ticks < 1024 ? 3 : ticks < 4096 ? 4 : 5;
+    return ramp->steep ? 1 : ticks < 128 ? 2 : ticks < 1024 ? 3 : ticks < 4096 ? 4 : 5;
 }
 
-/* The next group's size: a power of two whose change, of so much a pulse, and duration are within the limits. From the
- * last group's on, because that is nearly always it. */
-static NOINLINE void choose_group(ramp_t *ramp, uint32_t change, uint32_t most_change, uint32_t left)
+static uint8_t floor_log2(uint16_t n)
+{
+    uint8_t log2 = 0;
+    while (n >>= 1)
+        log2++;
+    return log2;
+}
+
+/* How many pulses the next group has: a power of two whose change, of so much a pulse, and duration are within the limits;
+ * where fewer are left, so many whole runs as before. From the last group's size on, because that is nearly always it. */
+static NOINLINE uint16_t choose_group(ramp_t *ramp, uint32_t change, uint32_t most_change, uint16_t left)
 {
     uint8_t log2 = ramp->group_log2;
-    uint32_t ticks = ramp->ticks;
-    if (!ramp->faster)
-        ticks += ticks >> 2; /* they grow */
+    uint16_t ticks = ramp->ticks;
+    ramp->rest = false;
+    if (ticks < BLOCK_SPLIT_TICKS) {
+        /* Where a few pulses could not be reloaded in time, the last run is of many. */
+        if (left < 2 * REST_PULSES)
+            ramp->rest = true;
+        else
+            left = (uint16_t)(left - REST_PULSES);
+    }
+    if (ticks > GROUP_MAX_TICKS / 2)
+        return 1; /* often, near a standstill */
+    if (!ramp->faster) {
+        ticks = (uint16_t)(ticks + (ticks >> part_log2(ramp))); /* they grow, and the variable shrinks */
+        most_change -= most_change >> 2;
+    }
+    uint16_t pulses = (uint16_t)(1u << log2);
+    uint16_t most_ticks = (uint16_t)(GROUP_MAX_TICKS >> log2);
     change <<= log2;
-    ticks <<= log2;
-    while (log2 && (change > most_change || ticks > GROUP_MAX_TICKS || left >> log2 == 0)) {
+    while (log2 && (log2 > ramp->most_log2 || ticks > most_ticks || change > most_change)) {
         change >>= 1;
-        ticks >>= 1;
+        most_ticks = (uint16_t)(most_ticks << 1);
+        pulses >>= 1;
         log2--;
     }
-    /* Speeding up, groups are made larger where the pulses left can be divided by it: small groups then come while there
-     * is time for them, not at the ramp's end. */
-    uint16_t align = ramp->faster && ramp->ticks >= ALIGN_TICKS ? (uint16_t)left : 0;
-    while (log2 < ramp->most_log2 && 2 * change <= most_change && 2 * ticks <= GROUP_MAX_TICKS && left >> log2 > 1 &&
-           (align & ((2u << log2) - 1)) == 0) {
-        change *= 2;
-        ticks *= 2;
+    while (log2 < ramp->most_log2 && ticks <= most_ticks >> 1 && pulses <= left >> 1) {
+        change += change;
+        if (change > most_change)
+            break;
+        most_ticks >>= 1;
+        pulses = (uint16_t)(pulses << 1);
         log2++;
     }
     ramp->group_log2 = log2;
+    if (ramp->rest && left <= pulses)
+        return left;
+    if (left >= pulses)
+        return pulses;
+    if (left < ODD_GROUP_LEAST) {
+        while (pulses > left)
+            pulses >>= 1;
+        return pulses;
+    }
+    if (left > UINT8_MAX)
+        left &= 0xFFFC; /* as many runs as a byte counts */
+    uint16_t odd = (uint16_t)(left & (ramp->run_pulses - 1u));
+    if (odd == left)
+        ramp->rest = true;
+    else
+        left = (uint16_t)(left - odd);
+    return left;
 }
 
-/* The intervals of a group whose mean is mean_q16: as those of the law, whose variable changes by part / 2^32 of its
+/* The shape of a group of intervals with this mean: as those of the law, whose variable changes by part / 2^32 of its
  * value in the group's middle. Returns mean * part^2. */
-static uint32_t shape(ramp_t *ramp, uint32_t mean_q16, uint32_t part)
+static uint32_t shape(ramp_t *ramp, block_t *group, uint32_t mean_q16, uint32_t part)
 {
     uint32_t slope = wide_fraction(mean_q16, part);
     uint32_t curve = wide_fraction(slope, part);
-    slope += wide_fraction(curve, part) >> 2; /* from end to end */
-    ramp->slope_q16 = (int32_t)(ramp->faster ? 0u - slope : slope);
-    ramp->shaped = true;
+    group->slope_q16 = (int32_t)slope;
+    ramp->third_q16 = wide_fraction(curve, part);
+    group->runs = 1; /* to be divided */
     return curve;
+}
+
+/* Intervals that are all alike, *sum each: how many of those left, and their sum. */
+static NOINLINE uint16_t flat(ramp_t *ramp, uint16_t left, ramp_time_t *sum)
+{
+    set_ticks(ramp, sum->ticks);
+    uint16_t pulses = choose_group(ramp, 0, 0, left);
+    ramp->rest = false;
+    uint32_t frac = (uint32_t)sum->frac_q16 * pulses;
+    sum->ticks = sum->ticks * pulses + (frac >> 16);
+    sum->frac_q16 = (uint16_t)frac;
+    return pulses;
 }
 
 /* -- harmonic ---------------------------------------------------------------------------------------------------- */
@@ -156,39 +204,65 @@ void ramp_begin_harmonic(ramp_t *ramp, const ramp_constants_t *constants, uint32
     ramp->u.harmonic.next2 = 2 * v_first;
     ramp->u.harmonic.cap2 = 2 * v_cap;
     ramp->u.harmonic.step2 = 2 * step;
-    ramp->steep = step > (uint32_t)wide_from_byte(&constants->k2_q16, 3) >> 10; /* K / 2^17 */
+    uint32_t k_by_128 = (uint32_t)wide_from_byte(&constants->k2_q16, 3);
+    ramp->steep = step > k_by_128 >> 10; /* K / 2^17 */
+    ramp->u.harmonic.step_q40 = step < k_by_128 >> 1 ? ratio_q32(2 * step, 0, k_by_128) : UINT32_MAX;
     set_ticks(ramp, interval_at_twice(constants, 2 * (v_first < v_cap ? v_first : v_cap)).ticks);
 }
 
-static void harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, uint32_t left, ramp_time_t *sum)
+/* The mean of 1 / (1 + x) over n pulses, x from -p / 2 to p / 2 (not quite: at the pulses), is 1 + second * (p^2 +
+ * fourth * p^4 + sixth * p^6), in 1 / 2^32. For n = 1, 2, 4, ... 32, and without end. */
+typedef struct {
+    uint32_t second, fourth, sixth;
+} series_t;
+#define SERIES(n2) \
+    {(uint32_t)(4294967296.0 / 12 * (1 - 1.0 / (n2))), (uint32_t)(4294967296.0 * 3 / 20 * (1 - 7.0 / 3 / (n2))), \
+     (uint32_t)(4294967296.0 * 3 / 112 * (1 - 6.0 / (n2) + 31.0 / 3 / (n2) / (n2)))}
+static const series_t series_of[] FLASH = {{0, 0, 0},   SERIES(4.0),   SERIES(16.0), SERIES(64.0),
+                                           SERIES(256.0), SERIES(1024.0), SERIES(1e9)};
+
+static uint16_t harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, uint16_t left, ramp_time_t *sum, block_t *group)
 {
     uint32_t first2 = ramp->u.harmonic.next2;
     uint32_t cap2 = ramp->u.harmonic.cap2;
     uint32_t step2 = ramp->u.harmonic.step2;
-    bool capped = first2 > cap2;
-    choose_group(ramp, step2, capped ? first2 - cap2 : first2 >> part_log2(ramp), left);
-    uint8_t log2 = ramp->group_log2;
-    uint32_t change2 = step2 << log2;
+    uint16_t pulses;
+    if (first2 > cap2) {
+        *sum = interval_at_twice(constants, cap2);
+        if (!ramp->faster) {
+            uint32_t above = (first2 - cap2) / step2 + 1; /* so many pulses */
+            if (above < left)
+                left = (uint16_t)above;
+        }
+        pulses = flat(ramp, left, sum);
+        if (!ramp->faster)
+            ramp->u.harmonic.next2 -= step2 * pulses;
+        return pulses;
+    }
+    pulses = choose_group(ramp, step2, first2 >> part_log2(ramp), left);
+    uint32_t change2 = step2 * pulses;
     uint32_t to_centre2 = (change2 - step2) >> 1;
-    uint32_t centre2 = ramp->faster ? first2 + to_centre2 : first2 - to_centre2;
-    ramp->u.harmonic.next2 = ramp->faster ? first2 + change2 : first2 - change2;
-    if (capped) {
-        centre2 = cap2;
-        change2 = 0;
+    if (!ramp->faster) {
+        change2 = 0u - change2;
+        to_centre2 = 0u - to_centre2;
     }
-    *sum = interval_at_twice(constants, centre2);
-    if (log2) {
+    ramp->u.harmonic.next2 = first2 + change2;
+    *sum = interval_at_twice(constants, first2 + to_centre2);
+    if (pulses > 1) {
         uint32_t mean = sum->ticks << 16 | sum->frac_q16;
-        uint32_t part = ratio_q24(change2, 0, centre2) << 8;
-        uint32_t curve = shape(ramp, mean, part);
-        /* The mean of 1 / (1 + x) over the pulses, x from -part / 2 to part / 2, n of them:
-         * 1 + (1 - 1 / n^2) / 12 * (part^2 + 3 / 20 * part^4 * (1 - 7 / 3 n^2)) */
-        uint32_t sum2 = (wide_fraction(wide_fraction(curve, part), part) * 19) >> 7;
-        sum2 += curve - ((sum2 * 37 >> 4) >> log2 >> log2);
-        mean += wide_fraction(sum2 - (sum2 >> log2 >> log2), 357913941u); /* 2^32 / 12 */
-        ramp->curve_q16 = (int32_t)(2 * curve);
-        set_q16(sum, mean << log2);
+        uint32_t part = wide_fraction(mean * pulses, ramp->u.harmonic.step_q40) << 8;
+        uint32_t curve = shape(ramp, group, mean, part);
+        group->curve_q16 = (int32_t)(2 * curve);
+        uint32_t fourth = wide_fraction(wide_fraction(curve, part), part);
+        const series_t *series = &series_of[pulses < 64 ? floor_log2(pulses) : 6];
+        curve += wide_fraction(fourth, flash_u32(&series->fourth));
+        if (ramp->steep)
+            curve += wide_fraction(wide_fraction(wide_fraction(fourth, part), part), flash_u32(&series->sixth));
+        mean += wide_fraction(curve, flash_u32(&series->second));
+        group->top_q16 = mean;
+        set_q16(sum, mean * pulses);
     }
+    return pulses;
 }
 
 /* -- linear ------------------------------------------------------------------------------------------------------ */
@@ -294,98 +368,123 @@ void ramp_begin_linear(ramp_t *ramp, const wide_t *c_q8, const wide_t *t_q4, uin
     set_ticks(ramp, between(ramp, &ramp->u.linear.t, &next) >> 4);
 }
 
-/* Beyond the bound all intervals are equal. */
-static void bounded_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum)
-{
-    const ramp_time_t *bound = &ramp->u.linear.bound;
-    set_ticks(ramp, bound->ticks);
-    choose_group(ramp, 0, 0, left);
-    uint8_t log2 = ramp->group_log2;
-    uint32_t frac = (uint32_t)bound->frac_q16 << log2;
-    sum->ticks = (bound->ticks << log2) + (frac >> 16);
-    sum->frac_q16 = (uint16_t)frac;
-    ramp->slope_q16 = 0;
-    ramp->curve_q16 = 0;
-    ramp->shaped = log2 != 0;
-}
-
 static bool is_longer(const ramp_time_t *a, const ramp_time_t *b)
 {
     return a->ticks > b->ticks || (a->ticks == b->ticks && a->frac_q16 > b->frac_q16);
 }
 
-static void linear_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum)
+static uint16_t linear_next(ramp_t *ramp, uint16_t left, ramp_time_t *sum, block_t *group)
 {
     if (ramp->u.linear.bounded) {
-        bounded_next(ramp, left, sum);
-        return;
+        *sum = ramp->u.linear.bound;
+        return flat(ramp, left, sum);
     }
     bool faster = ramp->faster;
     uint8_t halved = ramp->u.linear.halved;
     const ramp_time_t *bound = &ramp->u.linear.bound;
-    ramp_root_t begin = ramp->u.linear.t;
-    uint32_t limit = begin.whole;
-    limit = limit >> (31 - halved) ? GROUP_MAX_TICKS : limit << halved >> 4 >> part_log2(ramp);
-    choose_group(ramp, ramp->ticks, limit, left);
-    wide_t x;
-    wide_copy(&x, &ramp->u.linear.x);
+    ramp_root_t *t = &ramp->u.linear.t;
+    ramp_root_t begin = *t;
+    uint32_t limit = begin.whole >> (31 - halved) ? GROUP_MAX_TICKS : begin.whole << halved >> 4 >> part_log2(ramp);
     for (;;) {
-        uint8_t log2 = ramp->group_log2;
-        wide_t n = (uint16_t)(1u << log2);
+        uint16_t pulses = choose_group(ramp, ramp->ticks, limit, left);
+        wide_t n = pulses;
         wide_t change;
         wide_multiply(&change, &n, &ramp->u.linear.c);
         add_if(&ramp->u.linear.x, &change, faster);
-        ramp_root_t *end = &ramp->u.linear.t;
-        root_at(ramp, end);
-        uint32_t ticks_q4 = between(ramp, &begin, end);
+        root_at(ramp, t);
+        uint32_t ticks_q4 = between(ramp, &begin, t);
         sum->ticks = ticks_q4 >> 4;
         sum->frac_q16 = (uint16_t)(ticks_q4 << 12);
         ramp_time_t last = *sum;
-        if (log2) {
-            uint32_t mean = ticks_q4 << (12 - log2);
-            ramp->curve_q16 =
-                (int32_t)(3 * shape(ramp, mean, ratio_q24(ticks_q4, halved, (begin.whole >> 1) + (end->whole >> 1)) << 8));
-            set_q16(&last, mean + (uint32_t)(ramp->slope_q16 >> 1));
+        if (pulses > 1) {
+            uint32_t mean = ticks_q4 << 12; /* below 2^32 */
+            mean = pulses & (pulses - 1u) ? mean / pulses : mean >> floor_log2(pulses);
+            group->curve_q16 = (int32_t)(3 * shape(ramp, group, mean, ratio_q32(ticks_q4, halved, (begin.whole >> 1) + (t->whole >> 1))));
+            group->top_q16 = mean;
+            uint32_t half = (uint32_t)group->slope_q16 >> 1;
+            set_q16(&last, faster ? mean - half : mean + half);
         }
         if (faster ? !is_longer(bound, &last) : !is_longer(&last, bound))
-            return;
-        /* The bound is reached in it: half of it. */
-        if (log2 == 0)
+            return pulses;
+        /* The bound is reached in it: less. */
+        if (pulses == 1)
             break;
-        ramp->most_log2 = --ramp->group_log2;
-        wide_copy(&ramp->u.linear.x, &x);
+        ramp->most_log2 = (uint8_t)(floor_log2((uint16_t)(pulses - 1)));
+        add_if(&ramp->u.linear.x, &change, !faster);
     }
     ramp->u.linear.bounded = true;
     ramp->most_log2 = GROUP_MAX_LOG2;
     *sum = *bound;
+    return 1;
 }
 
 /* -- both -------------------------------------------------------------------------------------------------------- */
 
-uint16_t ramp_next(ramp_t *ramp, const ramp_constants_t *constants, uint32_t left, ramp_time_t *sum)
+/* Divides a group, given by its mean and the law's derivatives in its middle, into runs. */
+static void divide(ramp_t *ramp, uint16_t pulses, block_t *group)
 {
-    ramp->shaped = false;
-    if (ramp->linear)
-        linear_next(ramp, left, sum);
-    else
-        harmonic_next(ramp, constants, left, sum);
-    uint8_t log2 = ramp->group_log2;
-    set_ticks(ramp, sum->ticks >> log2);
-    uint16_t ticks = ramp->ticks;
-    ramp->run_log2 = log2;
-    if (ticks < BLOCK_SPLIT_TICKS && log2 < 3)
-        ramp->shaped = false;
-    if (ramp->shaped && ticks > RUN_PULSE_TICKS) {
-        /* How many pulses may share one or two timer values. */
-        uint32_t slope_q8 = magnitude(ramp->slope_q16) >> 8;
-        uint32_t span = (uint32_t)(ticks - RUN_PULSE_TICKS) << log2;
-        uint16_t least = ramp->steep ? 2 * RUN_STEEP_TICKS : 2 * RUN_TICKS;
-        uint16_t most = ticks < BLOCK_SPLIT_TICKS ? RUN_SLOPE_Q8 / 4 : RUN_SLOPE_Q8;
-        while (ramp->run_log2 > RUN_MAX_LOG2 || (ramp->run_log2 && slope_q8 > most && span >= least)) {
-            ramp->run_log2--;
-            slope_q8 /= 2;
-            span /= 2;
-        }
+    uint8_t run = 1;
+    uint16_t runs = pulses;
+    while ((runs & 1) == 0 && run < RUN_MAX_PULSES) {
+        runs >>= 1;
+        run = (uint8_t)(run << 1);
     }
-    return (uint16_t)(1u << log2);
+    uint8_t odd = (uint8_t)runs;
+    uint32_t slope = (uint32_t)group->slope_q16;
+    uint32_t curve = (uint32_t)group->curve_q16;
+    /* How many pulses may share one or two timer values. */
+    uint16_t ticks = ramp->ticks;
+    uint8_t halvings = 0;
+    if (ticks > RUN_PULSE_TICKS) {
+        uint16_t slope_q6 = slope < 1UL << 26 ? (uint16_t)(slope >> 10) : UINT16_MAX;
+        uint16_t span = (uint16_t)((ticks - RUN_PULSE_TICKS) * run);
+        uint16_t least = ramp->steep ? 2 * RUN_STEEP_TICKS : 2 * RUN_TICKS;
+        uint16_t most = ticks < BLOCK_SPLIT_TICKS ? RUN_SLOPE_Q6 / 4 : RUN_SLOPE_Q6;
+        slope_q6 = (uint16_t)(slope_q6 / odd);
+        while (run > 1 && slope_q6 > most && span >= least) {
+            halvings++;
+            run >>= 1;
+            slope_q6 >>= 1;
+            span >>= 1;
+        }
+        runs = (uint16_t)(runs << halvings);
+    }
+    ramp->run_pulses = run;
+    group->pulses = run;
+    group->runs = (uint8_t)runs;
+    /* The cubic part: so that two and four runs are right, and of more all nearly. */
+    slope += wide_fraction(ramp->third_q16, runs == 2 ? 1UL << 28 : runs == 4 ? 9UL << 26 : 3UL << 28);
+    if (odd > 1) {
+        uint32_t part = ratio_q32(1, 0, odd);
+        slope = wide_fraction(slope, part);
+        curve = wide_fraction(wide_fraction(curve, part), part);
+    }
+    slope >>= halvings;
+    curve >>= 2 * halvings;
+    /* From the law's to the differences of the runs. */
+    uint32_t sum = curve * (uint16_t)(runs - 1);
+    slope = ramp->faster ? 0u - slope : slope;
+    slope -= (uint32_t)((int32_t)(sum - curve) >> 1);
+    group->slope_q16 = (int32_t)slope;
+    group->curve_q16 = (int32_t)curve;
+    group->top_q16 -= 65536u;
+    group->top_q16 -= wide_fraction(sum * (uint16_t)(runs - 2), 715827883u); /* 2^32 / 6 */
+    group->top_q16 -= (uint32_t)((int32_t)(slope * (uint16_t)(runs - 1)) >> 1);
+}
+
+uint16_t ramp_next(ramp_t *ramp, const ramp_constants_t *constants, uint32_t left, ramp_time_t *sum, block_t *group)
+{
+    group->runs = 0;
+    uint16_t few = left > 4u << GROUP_MAX_LOG2 ? 4u << GROUP_MAX_LOG2 : (uint16_t)left;
+    uint16_t pulses = ramp->linear ? linear_next(ramp, few, sum, group) : harmonic_next(ramp, constants, few, sum, group);
+    bool shaped = group->runs != 0;
+    group->runs = 0;
+    if (pulses == 1) {
+        set_ticks(ramp, sum->ticks);
+    } else if (shaped) {
+        ramp->ticks = (uint16_t)(group->top_q16 >> 16);
+        if (!ramp->rest && (ramp->ticks >= BLOCK_SPLIT_TICKS || pulses >= 8))
+            divide(ramp, pulses, group);
+    }
+    return pulses;
 }

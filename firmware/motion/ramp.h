@@ -17,6 +17,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include "base/wide.h"
+#include "motion/block.h"
 
 typedef struct {
     uint32_t ticks;
@@ -38,20 +39,18 @@ typedef struct {
     bool linear;
     bool faster;        /* velocity grows from pulse to pulse */
     bool steep;         /* planning it takes as long as playing it, or nearly */
-    bool shaped;        /* slope and curve hold for the last group */
-    uint8_t group_log2; /* of the last group's pulses */
-    uint8_t most_log2;  /* of a group's pulses: less where the bound is near */
-    uint8_t run_log2;   /* of the pulses of a run that the group is divided into */
+    bool rest;          /* the last group was of the last pulses, too few for more than one run */
+    uint8_t group_log2; /* pulses of a group: this power of two, unless fewer are left */
+    uint8_t most_log2;  /* the same, at most: less where the bound is near */
     uint16_t ticks;     /* interval in the last group, at most 65535 */
-    /* How its intervals follow each other: by a parabola with this change (slope) from its beginning to its end, and
-     * this change of slope, in 1/65536 tick. */
-    int32_t slope_q16;
-    int32_t curve_q16;
+    uint8_t run_pulses; /* of the last group in several runs */
+    uint32_t third_q16; /* change of the last group's curve */
     union {
         struct {
             uint32_t next2; /* twice the velocity of the next pulse */
             uint32_t cap2;  /* never above */
             uint32_t step2; /* change per pulse */
+            uint32_t step_q40; /* half of that by K */
         } harmonic;
         struct {
             wide_t x;          /* square of the time from standstill at the next pulse, in units of 2^halved / 16 ticks */
@@ -89,8 +88,9 @@ void ramp_linear_c(wide_t *c_q8, uint16_t steps_per_rev, uint8_t factor_log2, ui
 /* a * b / divisor, truncated, where that fits 32 bits. divisor >= 1. */
 uint32_t ramp_scale(uint32_t a, uint32_t b, uint32_t divisor);
 
-/* The next group of at most `left` pulses (>= 1): returns how many, a power of two up to 512, and the sum of their
- * intervals; that of several is below 65,536 ticks. */
-uint16_t ramp_next(ramp_t *ramp, const ramp_constants_t *constants, uint32_t left, ramp_time_t *sum);
+/* The next group of at most `left` pulses (>= 1): returns how many, up to 512, and the sum of their intervals; that of
+ * several is below 65,536 ticks. How these follow each other: `block`, of which runs, pulses, top, slope and curve are set;
+ * no runs: alike. */
+uint16_t ramp_next(ramp_t *ramp, const ramp_constants_t *constants, uint32_t left, ramp_time_t *sum, block_t *block);
 
 #endif

@@ -56,5 +56,16 @@ extern volatile uint8_t step_idle;  /* interrupt: 1 = the ring ran out and the t
 extern volatile uint8_t step_late;  /* interrupt: 1 = a reload missed its period (latched) */
 extern volatile uint8_t motion_state; /* motion_state_t; interrupt while it plays, main loop in standstill */
 
+static inline segment_t *segment_at(uint8_t offset)
+{
+#ifdef __AVR__
+    segment_t *segment; /* the ring is one page of RAM: an offset is the low byte of the address */
+    __asm__("mov %A0, %1\n\tldi %B0, hi8(segments)" : "=d"(segment) : "r"(offset));
+    return segment;
+#else
+    return &segments[offset / SEGMENT_BYTES];
+#endif
+}
+
 #endif
 #endif

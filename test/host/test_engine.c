@@ -43,6 +43,13 @@ void tearDown(void)
 
 /* -- helpers --------------------------------------------------------------------------------------------------------- */
 
+/* The engine reads the settings when it is begun. */
+static void set_pulse_us(uint8_t pulse_us)
+{
+    settings.pulse_us = pulse_us;
+    engine_init();
+}
+
 /* steps < 0: counter-clockwise. Harmonic ramps, values as on the terminal. */
 static motion_command_t move(int32_t steps, uint32_t rpm, double accel, double decel)
 {
@@ -334,7 +341,7 @@ static void test_a_cycle_with_a_fraction_of_a_tick_does_not_drift(void)
 /* CLK-015, STA-008 */
 static void test_500_khz_are_played_without_a_gap(void)
 {
-    settings.pulse_us = 1;
+    set_pulse_us(1);
     motion_command_t both[] = {cycle_move(5000, 2, 999, 999), cycle_move(5000, 2, 999, 999)};
     run_all(both, 2);
     assert_ended_at(10000);
@@ -440,7 +447,7 @@ static void test_after_a_deceleration_a_reversal_passes_through_slow_speed(void)
 /* DIR-007 */
 static void test_reversals_at_high_speed_lose_no_pulse(void)
 {
-    settings.pulse_us = 1;
+    set_pulse_us(1);
     motion_command_t moves[8];
     for (unsigned i = 0; i < 8; i++)
         moves[i] = cycle_move(i & 1 ? -(int32_t)(3 + i) : (int32_t)(50 + i), i & 2 ? 20 : 4, 999, 999);
@@ -678,11 +685,11 @@ static void test_a_stop_is_followed_by_no_edge_and_loses_none(void)
 /* STO-001 */
 static void test_a_stop_at_high_speed_leaves_the_position_right(void)
 {
-    settings.pulse_us = 1;
+    set_pulse_us(1);
     for (uint32_t cycle_us = 2; cycle_us < 40; cycle_us += cycle_us < 8 ? 1 : 7) {
         for (uint64_t odd = 0; odd < 130; odd += 3) {
             setUp();
-            settings.pulse_us = 1;
+            set_pulse_us(1);
             submit(cycle_move(-5000, cycle_us, 999, 999));
             run_until(9000 + odd);
             engine_stop();
@@ -908,7 +915,7 @@ static void test_the_position_equals_the_edges_at_every_moment(void)
     static const uint16_t strides[] = {7, 13, 61, 333, 4999};
     for (size_t i = 0; i < sizeof strides / sizeof strides[0]; i++) {
         setUp();
-        settings.pulse_us = 1;
+        set_pulse_us(1);
         submit(cycle_move(300, 3 + (uint32_t)i * 10, 999, 999));
         submit(cycle_move(-200, 4 + (uint32_t)i * 11, 999, 999));
         for (unsigned k = 0; k < 20000 && !step_player_stopped(); k++) {
@@ -975,7 +982,7 @@ static void test_commands_that_cannot_be_kept_are_refused(void)
 {
     motion_command_t c = cycle_move(10, 2, 999, 999);
     TEST_ASSERT_EQUAL(STATUS_PERIOD_TOO_SHORT, engine_check(&c)); /* pulse 2 us */
-    settings.pulse_us = 1;
+    set_pulse_us(1);
     TEST_ASSERT_EQUAL(STATUS_OK, engine_check(&c));
     c.velocity = 1;
     TEST_ASSERT_EQUAL(STATUS_PERIOD_TOO_SHORT, engine_check(&c));

@@ -279,10 +279,22 @@ static bool ramp_is_right(const trial_t *t, const profile_basis_t *basis, const 
     watch_t w = {.trial = t, .shortest = shortest, .longest = longest, .faster = faster, .law = law};
     while (pulses) {
         ramp_time_t sum;
-        uint16_t group = ramp_next(ramp, &basis->ramp, pulses, &sum);
+        block_t block;
+        uint16_t group = ramp_next(ramp, &basis->ramp, pulses, &sum, &block);
         if (group == 0 || group > pulses) {
             FAIL(t, "%s: group of %u, %u left", phase, group, pulses);
             return false;
+        }
+        if (block.runs) {
+            long double k = block.runs;
+            long double played = k * (block.top_q16 + 65536.0L + block.slope_q16 * (k - 1.0L) / 2.0L +
+                                      block.curve_q16 * (k - 1.0L) * (k - 2.0L) / 6.0L);
+            long double off = played * block.pulses / 65536.0L - (sum.ticks + sum.frac_q16 / 65536.0L);
+            if (block.runs * block.pulses != group || fabsl(off) > 0.02L) {
+                FAIL(t, "%s: %u runs of %u for a group of %u, %.3Lf ticks too long", phase, block.runs, block.pulses,
+                     group, off);
+                return false;
+            }
         }
         pulses -= group;
         if (!group_is_right(&w, phase, group, &sum, pulses == 0))

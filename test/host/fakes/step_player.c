@@ -108,11 +108,6 @@ static void set_dir(uint64_t time, bool level)
 
 /* -- the interrupt --------------------------------------------------------------------------------------------------- */
 
-static const segment_t *segment_at(uint8_t offset)
-{
-    return &segments[offset / SEGMENT_BYTES];
-}
-
 static uint32_t counted(const segment_t *s)
 {
     return (uint32_t)s->count_high * 256u + (s->count_low ? s->count_low : 256u);
