@@ -183,7 +183,7 @@ static NOINLINE void close_parameter(motion_syntax_t *syntax)
 }
 
 /* A digit that is not simply one more of a whole number. */
-static NOINLINE void take_special_digit(motion_syntax_t *syntax, uint8_t digit)
+static void take_special_digit(motion_syntax_t *syntax, uint8_t digit)
 {
     if (syntax->number & NO_NUMBER) {
         refuse(syntax, STATUS_SYNTAX);
@@ -257,7 +257,7 @@ void motion_syntax_begin(motion_syntax_t *syntax, char first_letter, const sessi
     syntax->single = syntax->parameter != PARAMETER_COUNT;
 }
 
-static NOINLINE void take_other(motion_syntax_t *syntax, uint8_t c)
+static void take_other(motion_syntax_t *syntax, uint8_t c)
 {
     if (c == '.') {
         take_point(syntax);

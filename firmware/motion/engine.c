@@ -21,7 +21,7 @@
 #define AHEAD_PERIODS 12u        /* they last; when the last one begins, the next segment must be there */
 #define CUT_KEEP_TICKS 32768u    /* motion left to run while a deceleration is planned */
 #define CRUISE_GROUP_TICKS 4096u /* shortest run of a cruise whose interval has a fraction */
-#define JOIN_TICKS 10000u         /* before the tail: to plan a command and emit its first intervals */
+#define JOIN_TICKS 18000u         /* before the tail: to plan a command and emit its first intervals */
 #define JOIN_LINEAR_TICKS 40000u  /* the same for a linear one */
 #define JOIN_FLAT_TICKS 2500u     /* and for one without ramps */
 #define JOIN_SOON_TICKS 160000u   /* before the tail: when that is done at the earliest */
@@ -50,6 +50,7 @@ static bool playing; /* the timer runs (it may play silence) */
 static stage_t stage;
 static ramp_t ramp;
 static motion_state_t ramp_state; /* the phase that `ramp` was begun for; MOTION_STANDBY: none */
+static uint32_t *phase_left;       /* pulses of the phase being emitted, in `profile` */
 static block_t block;             /* of that phase, while it has runs left */
 
 static uint32_t silence_chunks;  /* still to be emitted before ... */
@@ -111,13 +112,13 @@ void engine_init(void)
 
 /* -- the ring -------------------------------------------------------------------------------------------------- */
 
-static uint8_t early_periods(uint8_t flags)
+static NOINLINE uint8_t early_periods(uint8_t flags)
 {
     return (uint8_t)((flags & SEGMENT_EARLY_MASK) >> SEGMENT_EARLY_SHIFT);
 }
 
 /* Which reload a period of top + 1 ticks needs. */
-static uint8_t early_flags(uint16_t top)
+static NOINLINE uint8_t early_flags(uint16_t top)
 {
     uint8_t periods = (uint8_t)((top < SEGMENT_EARLY1_BELOW_TICKS - 1) + (top < SEGMENT_EARLY2_BELOW_TICKS - 1) +
                                 (top < SEGMENT_EARLY3_BELOW_TICKS - 1));
@@ -185,7 +186,7 @@ static void look_for_end(void)
     }
 }
 
-static uint16_t give(uint32_t *phase, uint16_t pulses)
+static NOINLINE uint16_t give(uint32_t *phase, uint16_t pulses)
 {
     uint16_t some = *phase < pulses ? (uint16_t)*phase : pulses;
     *phase -= some;
@@ -269,6 +270,20 @@ static uint32_t interval_at(uint8_t offset)
     return ticks;
 }
 
+/* Ticks from the segment at `offset`, which has so many periods left, to the one at `end`, or more than
+ * JOIN_SOON_TICKS. */
+static uint32_t ticks_between(uint8_t offset, uint16_t periods, uint8_t end)
+{
+    uint32_t ticks = 0;
+    while (offset != end && ticks <= JOIN_SOON_TICKS) {
+        const segment_t *s = segment_at(offset);
+        ticks += period_ticks(s) * periods;
+        offset = (uint8_t)(offset + SEGMENT_BYTES);
+        periods = counted_periods(segment_at(offset));
+    }
+    return ticks;
+}
+
 static int32_t signed_pulses(const segment_t *s, uint16_t pulses)
 {
     if (is_silent(s))
@@ -334,7 +349,7 @@ static void set_interval(uint32_t chunks, uint32_t ticks, bool pulse)
 }
 
 /* Adds the carried fraction to a time; what remains is carried on. */
-static uint32_t take_carry(uint32_t ticks, uint16_t frac_q16)
+static NOINLINE uint32_t take_carry(uint32_t ticks, uint16_t frac_q16)
 {
     int32_t carry = carry_q16 + frac_q16;
     carry_q16 = carry & 0xFFFF;
@@ -402,9 +417,10 @@ static void emit_flat(uint16_t pulses, uint32_t ticks, motion_state_t state, boo
     push_run(pulses, (uint16_t)((uint16_t)ticks - (uint16_t)each * pulses), (uint16_t)each, faster, state);
 }
 
-/* Appends what the ring has room for of the block, which is part of the phase that has so many pulses left. */
-static void emit_block(uint32_t *left)
+/* Appends what the ring has room for of the block. */
+static void emit_block(void)
 {
+    uint32_t *left = phase_left;
     look_for_end();
     uint8_t pulses = block.pulses;
     uint8_t runs = block.runs;
@@ -436,21 +452,22 @@ static void begin_block(bool faster)
     block.carry_q16 = 0;
     if (carry_q16 > 0) { /* otherwise it waits for a single interval */
         uint32_t carry = (uint32_t)carry_q16;
-        uint32_t each = carry / block.pulses;
-        if (!split)
-            carry = each;
-        if (carry <= UINT16_MAX)
-            block.carry_q16 = (uint16_t)carry;
-        else
-            block.top_q16 += each / block.runs;
         carry_q16 = 0;
+        if (!split || carry > UINT16_MAX) {
+            carry /= block.pulses; /* of each interval */
+            if (split || carry > UINT16_MAX) { /* left by runs of more pulses */
+                block.top_q16 += carry / block.runs;
+                carry = 0;
+            }
+        }
+        block.carry_q16 = (uint16_t)carry;
     }
     block.width_ticks = width_ticks;
     block.flags = (uint8_t)(ramp_state | direction_flags(&command, false));
 }
 
 /* The next intervals of the ramp of `ramp_state`: pulses all alike, a block, or some of the former before a block. */
-static void emit_ramp(uint32_t *left, uint32_t at_most, bool faster)
+static void emit_ramp(uint32_t at_most, bool faster)
 {
     if (ahead_ticks || dir_due || owed)
         at_most = 1;
@@ -467,12 +484,12 @@ static void emit_ramp(uint32_t *left, uint32_t at_most, bool faster)
         pulses = (uint8_t)(pulses + group);
         at_most -= group;
     } while (ramp.rest && at_most);
-    *left -= pulses;
+    *phase_left -= pulses;
     if (pulses)
         emit_flat(pulses, ticks, ramp_state, faster);
 }
 
-static void emit_cruise(uint32_t *left, uint32_t at_most)
+static void emit_cruise(uint32_t at_most)
 {
     const profile_interval_t *interval = &profile.cruise;
     uint32_t ticks = interval->ticks_q8 >> 8;
@@ -483,14 +500,14 @@ static void emit_cruise(uint32_t *left, uint32_t at_most)
         chunks = 0;
     }
     if (chunks || ahead_ticks) {
-        (*left)--;
+        (*phase_left)--;
         ticks = take_carry(ticks, (uint16_t)(frac << 8));
         set_interval(chunks, ticks, true);
         return;
     }
     uint16_t run = at_most > 65000u ? 65000u : (uint16_t)at_most;
     if (frac == 0 || run < 8) {
-        *left -= run;
+        *phase_left -= run;
         uint32_t fraction = (uint32_t)frac * run;
         emit_flat(run, take_carry(ticks * run + (fraction >> 8), (uint16_t)(fraction << 8)), MOTION_CRUISE, true);
         return;
@@ -559,8 +576,8 @@ static void push_tail(void)
     tail_awaited = true;
 }
 
-/* One step of emission; false if there is nothing to emit. The ring has room for RING_RESERVE segments. */
-static bool emit(void)
+/* What comes next, but for a block, which is only begun. False if there is nothing. */
+static bool emit_other(void)
 {
     if (silence_chunks) {
         uint16_t periods = silence_chunks > SILENCE_MAX_PERIODS ? SILENCE_MAX_PERIODS : (uint16_t)silence_chunks;
@@ -590,35 +607,29 @@ static bool emit(void)
     }
     case STAGE_RUN: {
         uint32_t after = p->decel_pulses;
-        uint32_t *left = &p->decel_pulses;
         motion_state_t state = MOTION_DECEL;
+        phase_left = &p->decel_pulses;
         if (p->accel_pulses) {
             after += p->cruise_pulses;
-            left = &p->accel_pulses;
+            phase_left = &p->accel_pulses;
             state = MOTION_ACCEL;
         } else if (p->cruise_pulses) {
-            left = &p->cruise_pulses;
+            phase_left = &p->cruise_pulses;
             state = MOTION_CRUISE;
         } else {
             after = 0;
         }
-        if (block.runs == 0) {
-            uint8_t kept = after == 0; /* for the closing interval */
-            if (*left <= kept) {
-                begin_closing();
-                return true;
-            }
-            uint32_t at_most = *left - kept;
-            if (state == MOTION_CRUISE) {
-                ramp_state = state;
-                emit_cruise(left, at_most);
-            } else {
-                begin_ramp(state);
-                emit_ramp(left, at_most, state == MOTION_ACCEL && p->faster);
-            }
+        uint8_t kept = after == 0; /* for the closing interval */
+        uint32_t at_most = *phase_left - kept;
+        if (*phase_left <= kept) {
+            begin_closing();
+        } else if (state == MOTION_CRUISE) {
+            ramp_state = state;
+            emit_cruise(at_most);
+        } else {
+            begin_ramp(state);
+            emit_ramp(at_most, state == MOTION_ACCEL && p->faster);
         }
-        if (block.runs)
-            emit_block(left);
         return true;
     }
     case STAGE_TAIL:
@@ -641,6 +652,18 @@ static bool emit(void)
         return true;
     }
     return false;
+}
+
+/* One step of emission; false if there is nothing to emit. The ring has room for RING_RESERVE segments. */
+static bool emit(void)
+{
+    if (block.runs == 0) {
+        bool more = emit_other();
+        if (block.runs == 0)
+            return more;
+    }
+    emit_block();
+    return true;
 }
 
 /* Nothing of the command is to be emitted any more, or joined to. */
@@ -722,16 +745,16 @@ static uint16_t certain_ticks(void)
 static void fill(void)
 {
     uint32_t ticks = 0;
+    uint16_t periods = 0;
     uint8_t offset = step_head;
-    uint32_t periods = 0;
     while ((ticks < START_TICKS || periods < START_PERIODS ||
-            (!playing && (ramp_state == MOTION_ACCEL || ramp_state == MOTION_DECEL) && (ramp.steep || ramp.group_log2 == 0))) &&
+            (!playing && (ramp_state == MOTION_ACCEL || ramp_state == MOTION_DECEL) &&
+             (ramp.steep > 1 || ramp.group_log2 == 0))) &&
            ring_free() >= RING_RESERVE && emit()) {
-        for (; offset != step_head; offset = (uint8_t)(offset + SEGMENT_BYTES)) {
-            uint16_t counted = counted_periods(segment_at(offset));
-            periods += counted;
-            ticks += period_ticks(segment_at(offset)) * counted;
-        }
+        uint16_t first = counted_periods(segment_at(offset));
+        ticks += ticks_between(offset, first, step_head);
+        periods = (uint16_t)(first + (uint8_t)(step_head - offset) / SEGMENT_BYTES); /* at least */
+        offset = step_head;
     }
 }
 
@@ -778,7 +801,7 @@ static void expire_gap(void)
 }
 
 /* Ticks of the start wait, saturated. */
-static uint32_t wait_ticks(uint32_t us)
+static NOINLINE uint32_t wait_ticks(uint32_t us)
 {
     return us < UINT32_MAX / TICKS_PER_US ? us * TICKS_PER_US : UINT32_MAX;
 }
@@ -788,8 +811,6 @@ static uint32_t ticks_to_tail(void)
 {
     step_snapshot_t at = step_port_snapshot();
     uint8_t offset = (uint8_t)(at.tail - SEGMENT_BYTES);
-    uint16_t periods = at.to_count;
-    uint32_t ticks = 0;
     look_for_end();
     if (!tail_valid || !tail_awaited)
         return 0;
@@ -799,13 +820,7 @@ static uint32_t ticks_to_tail(void)
         uint16_t counter = step_port_counter();
         return at.period_over || counter > top ? 0 : top - counter;
     }
-    while (offset != tail_offset && ticks <= JOIN_SOON_TICKS) {
-        const segment_t *s = segment_at(offset);
-        ticks += period_ticks(s) * periods;
-        offset = (uint8_t)(offset + SEGMENT_BYTES);
-        periods = counted_periods(segment_at(offset));
-    }
-    return ticks;
+    return ticks_between(offset, at.to_count, tail_offset);
 }
 
 /* Has the segment after the tail begun? (An idle timer is dealt with by engine_poll.) */

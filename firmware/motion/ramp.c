@@ -17,7 +17,6 @@
 #define STEEP_BITS 36u /* of C: first intervals below 16,384 ticks */
 /* Runs: the interrupt's cycles for two segments, the planner's, and as much for others; and those of each pulse. */
 #define RUN_TICKS 500u
-#define RUN_STEEP_TICKS 1500u /* of steep ramps, where every segment counts */
 #define RUN_PULSE_TICKS 24u
 #define RUN_SLOPE_Q6 124u /* change of the interval within a run */
 
@@ -98,12 +97,12 @@ static NOINLINE uint32_t ratio_q32(uint32_t part, uint8_t halved, uint32_t whole
     return wide_half(&quotient, 0);
 }
 
-/* By what part of its value, a power of two, the law's variable may change in a group, so that the parabola stays within a
- * tenth of a tick of the law. Steep ramps need groups that last as long as it takes to plan them. */
-static uint8_t part_log2(const ramp_t *ramp)
+/* By what part of its value, a power of two, the law's variable may change in a group. The parabola is off by no more than
+ * 1/32 of the cube of that, of the interval: a 16,000th, or at less than 128 ticks a 2,000th. Steep ramps need groups that
+ * last as long as it takes to plan them. */
+static NOINLINE uint8_t part_log2(const ramp_t *ramp)
 {
-    uint16_t ticks = ramp->ticks;
-    return ramp->steep ? 1 : ticks < 128 ? 2 : ticks < 1024 ? 3 : ticks < 4096 ? 4 : 5;
+    return ramp->steep > 1 ? 1 : ramp->ticks < 128 ? 2 : 3;
 }
 
 static uint8_t floor_log2(uint16_t n)
@@ -156,7 +155,7 @@ static NOINLINE uint16_t choose_group(ramp_t *ramp, uint32_t change, uint32_t mo
         return left;
     if (left >= pulses)
         return pulses;
-    if (left < ODD_GROUP_LEAST) {
+    if (ramp->steep > 1 && left < ODD_GROUP_LEAST) {
         while (pulses > left)
             pulses >>= 1;
         return pulses;
@@ -205,21 +204,32 @@ void ramp_begin_harmonic(ramp_t *ramp, const ramp_constants_t *constants, uint32
     ramp->u.harmonic.cap2 = 2 * v_cap;
     ramp->u.harmonic.step2 = 2 * step;
     uint32_t k_by_128 = (uint32_t)wide_from_byte(&constants->k2_q16, 3);
-    ramp->steep = step > k_by_128 >> 10; /* K / 2^17 */
+    ramp->steep = step > k_by_128 >> 10 ? 2 : step > k_by_128 / 3072; /* K / 2^17, 2^18.6 */
     ramp->u.harmonic.step_q40 = step < k_by_128 >> 1 ? ratio_q32(2 * step, 0, k_by_128) : UINT32_MAX;
     set_ticks(ramp, interval_at_twice(constants, 2 * (v_first < v_cap ? v_first : v_cap)).ticks);
 }
 
 /* The mean of 1 / (1 + x) over n pulses, x from -p / 2 to p / 2 (not quite: at the pulses), is 1 + second * (p^2 +
- * fourth * p^4 + sixth * p^6), in 1 / 2^32. For n = 1, 2, 4, ... 32, and without end. */
+ * fourth * p^4 + sixth * p^6), in 1 / 2^32. For n = 1 to 8, and roughly for those from 8, 16, 32 and 64 on. */
 typedef struct {
     uint32_t second, fourth, sixth;
 } series_t;
-#define SERIES(n2) \
-    {(uint32_t)(4294967296.0 / 12 * (1 - 1.0 / (n2))), (uint32_t)(4294967296.0 * 3 / 20 * (1 - 7.0 / 3 / (n2))), \
-     (uint32_t)(4294967296.0 * 3 / 112 * (1 - 6.0 / (n2) + 31.0 / 3 / (n2) / (n2)))}
-static const series_t series_of[] FLASH = {{0, 0, 0},   SERIES(4.0),   SERIES(16.0), SERIES(64.0),
-                                           SERIES(256.0), SERIES(1024.0), SERIES(1e9)};
+#define SERIES(n) \
+    {(uint32_t)(4294967296.0 / 12 * (1 - 1.0 / (n) / (n))), \
+     (uint32_t)(4294967296.0 * 3 / 20 * (1 - 7.0 / 3 / (n) / (n))), \
+     (uint32_t)(4294967296.0 * 3 / 112 * (1 - 6.0 / (n) / (n) + 31.0 / 3 / (n) / (n) / (n) / (n)))}
+static const series_t series_of[] FLASH = {SERIES(2.0), SERIES(3.0), SERIES(4.0),  SERIES(5.0),  SERIES(6.0),
+                                           SERIES(7.0), SERIES(8.0), SERIES(16.0), SERIES(32.0), SERIES(1e9)};
+
+static const series_t *series(uint16_t pulses)
+{
+    uint8_t place = 6;
+    if (pulses < 8)
+        place = (uint8_t)(pulses - 2);
+    for (; place < 9 && pulses >= 16; place++)
+        pulses >>= 1;
+    return &series_of[place];
+}
 
 static uint16_t harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, uint16_t left, ramp_time_t *sum, block_t *group)
 {
@@ -254,11 +264,11 @@ static uint16_t harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, u
         uint32_t curve = shape(ramp, group, mean, part);
         group->curve_q16 = (int32_t)(2 * curve);
         uint32_t fourth = wide_fraction(wide_fraction(curve, part), part);
-        const series_t *series = &series_of[pulses < 64 ? floor_log2(pulses) : 6];
-        curve += wide_fraction(fourth, flash_u32(&series->fourth));
-        if (ramp->steep)
-            curve += wide_fraction(wide_fraction(wide_fraction(fourth, part), part), flash_u32(&series->sixth));
-        mean += wide_fraction(curve, flash_u32(&series->second));
+        const series_t *factor = series(pulses);
+        curve += wide_fraction(fourth, flash_u32(&factor->fourth));
+        if (ramp->steep > 1)
+            curve += wide_fraction(wide_fraction(wide_fraction(fourth, part), part), flash_u32(&factor->sixth));
+        mean += wide_fraction(curve, flash_u32(&factor->second));
         group->top_q16 = mean;
         set_q16(sum, mean * pulses);
     }
@@ -336,7 +346,8 @@ void ramp_begin_linear(ramp_t *ramp, const wide_t *c_q8, const wide_t *t_q4, uin
     wide_copy(&t, t_q4);
     wide_copy(c, c_q8);
     /* In units that let t^2 fit 64 bits to the end. */
-    uint8_t bits = (uint8_t)(wide_bits(c) + wide_bits(&n));
+    uint8_t bits_of_c = wide_bits(c);
+    uint8_t bits = (uint8_t)(bits_of_c + wide_bits(&n));
     uint8_t start_bits = (uint8_t)(2 * wide_bits(&t));
     if (start_bits > bits)
         bits = start_bits;
@@ -358,7 +369,7 @@ void ramp_begin_linear(ramp_t *ramp, const wide_t *c_q8, const wide_t *t_q4, uin
         wide_multiply(x, &n, c); /* to standstill, exactly */
     }
     root_at(ramp, &ramp->u.linear.t);
-    ramp->steep = wide_bits(c_q8) <= STEEP_BITS;
+    ramp->steep = bits_of_c <= STEEP_BITS ? 2 : bits_of_c <= STEEP_BITS + 6;
     /* The first interval, to choose the first group's size. */
     wide_copy(&t, x);
     add_if(x, c, faster);
@@ -438,9 +449,10 @@ static void divide(ramp_t *ramp, uint16_t pulses, block_t *group)
     if (ticks > RUN_PULSE_TICKS) {
         uint16_t slope_q6 = slope < 1UL << 26 ? (uint16_t)(slope >> 10) : UINT16_MAX;
         uint16_t span = (uint16_t)((ticks - RUN_PULSE_TICKS) * run);
-        uint16_t least = ramp->steep ? 2 * RUN_STEEP_TICKS : 2 * RUN_TICKS;
+        uint16_t least = (uint16_t)(2 * RUN_TICKS + 2 * RUN_TICKS * ramp->steep);
         uint16_t most = ticks < BLOCK_SPLIT_TICKS ? RUN_SLOPE_Q6 / 4 : RUN_SLOPE_Q6;
-        slope_q6 = (uint16_t)(slope_q6 / odd);
+        if (odd > 1)
+            slope_q6 = (uint16_t)(slope_q6 / odd);
         while (run > 1 && slope_q6 > most && span >= least) {
             halvings++;
             run >>= 1;

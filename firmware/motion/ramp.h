@@ -38,7 +38,7 @@ typedef struct {
 typedef struct {
     bool linear;
     bool faster;        /* velocity grows from pulse to pulse */
-    bool steep;         /* planning it takes as long as playing it, or nearly */
+    uint8_t steep;      /* 0; 1: its runs may be longer; 2: planning it takes as long as playing it, or nearly */
     bool rest;          /* the last group was of the last pulses, too few for more than one run */
     uint8_t group_log2; /* pulses of a group: this power of two, unless fewer are left */
     uint8_t most_log2;  /* the same, at most: less where the bound is near */
