@@ -58,6 +58,7 @@ void image_idle(uint64_t most_cycles); /* until the motor stands, nothing is pen
 void image_until_state(uint8_t state, uint64_t most_cycles);
 void image_until_pulses(size_t count, uint64_t most_cycles);
 int32_t image_position(void); /* as `p` shows it; it must show STANDBY and no fault */
+int32_t image_position_and_faults(unsigned *faults); /* the same, where there may be some (engine.h) */
 
 /* Row n of the queue as `q` prints it, CR LF apart. The display is asked for once: *display = image_display("q"). */
 const char *image_row(const char *display, unsigned n);
