@@ -14,12 +14,12 @@
 #define TURN_TICKS (DIR_SETUP_TICKS + 100u) /* the same where the step interrupt sets dir: its latency and cycles */
 #define TAIL_TICKS 320u          /* the end of the closing interval, on which a following command is joined */
 #define SHORTEST_PIECE_TICKS 128u
-#define SILENCE_MAX_PERIODS 65000u
+#define RUN_MAX_PERIODS 65000u
 #define AHEAD_TICKS 24576u       /* silence begun before a profile with ramps is planned: 1.5 ms */
 #define AHEAD_LONG_TICKS 49152u  /* twice that, where possible */
 #define AHEAD_SHORT_TICKS 12000u /* and one without ramps */
 #define AHEAD_PERIODS 12u        /* they last; when the last one begins, the next segment must be there */
-#define CUT_KEEP_TICKS 32768u    /* motion left to run while a deceleration is planned */
+#define CUT_KEEP_TICKS 49152u    /* motion left to run while a deceleration is planned */
 #define CRUISE_GROUP_TICKS 4096u /* shortest run of a cruise whose interval has a fraction */
 #define JOIN_TICKS 18000u         /* before the tail: to plan a command and emit its first intervals */
 #define JOIN_LINEAR_TICKS 40000u  /* the same for a linear one */
@@ -505,7 +505,7 @@ static void emit_cruise(uint32_t at_most)
         set_interval(chunks, ticks, true);
         return;
     }
-    uint16_t run = at_most > 65000u ? 65000u : (uint16_t)at_most;
+    uint16_t run = at_most > RUN_MAX_PERIODS ? RUN_MAX_PERIODS : (uint16_t)at_most;
     if (frac == 0 || run < 8) {
         *phase_left -= run;
         uint32_t fraction = (uint32_t)frac * run;
@@ -580,7 +580,7 @@ static void push_tail(void)
 static bool emit_other(void)
 {
     if (silence_chunks) {
-        uint16_t periods = silence_chunks > SILENCE_MAX_PERIODS ? SILENCE_MAX_PERIODS : (uint16_t)silence_chunks;
+        uint16_t periods = silence_chunks > RUN_MAX_PERIODS ? RUN_MAX_PERIODS : (uint16_t)silence_chunks;
         silence_chunks -= periods;
         push(periods, PROFILE_CHUNK_TICKS - 1, false, ramp_state);
         return true;
@@ -758,6 +758,27 @@ static void fill(void)
     }
 }
 
+/* Without ramps a command is all cruise: it need not be planned either, if its interval is of whole ticks and the pulses
+ * last for long enough. Emits them and returns how many; 0: plan first. */
+static uint16_t begin_cruise(void)
+{
+    uint8_t factor_log2 = basis.factor_log2;
+    if (command.accel != ACCEL_NONE || command.decel != ACCEL_NONE)
+        return 0;
+    uint32_t cycle_us = profile_cycle_us(&basis, &command);
+    uint16_t ticks = (uint16_t)(cycle_us * TICKS_PER_US);
+    if (cycle_us > UINT16_MAX / TICKS_PER_US || ticks & ((1u << factor_log2) - 1))
+        return 0;
+    ticks = (uint16_t)(ticks >> factor_log2);
+    uint32_t pulses = command.count - 1; /* at least: full steps have more */
+    uint16_t run = pulses > RUN_MAX_PERIODS ? RUN_MAX_PERIODS : (uint16_t)pulses;
+    if ((uint32_t)run * ticks < START_TICKS)
+        return 0;
+    profile.accel_pulses = profile.cruise_pulses = profile.decel_pulses = 0;
+    push(run, (uint16_t)(ticks - 1), true, MOTION_CRUISE);
+    return run;
+}
+
 /* Starts the command, which is not planned yet, from standstill. */
 static void start_now(void)
 {
@@ -765,6 +786,7 @@ static void start_now(void)
     step_port_dir(dir_level(is_ccw(&command)));
     uint8_t flags = direction_flags(&command, false);
     uint16_t certain = certain_ticks();
+    uint16_t cruised = 0;
     if (command.start_wait_us < 4096u) {
         uint16_t lead = (uint16_t)(command.start_wait_us * TICKS_PER_US);
         if (lead < DIR_SETUP_TICKS + width_ticks)
@@ -777,6 +799,8 @@ static void start_now(void)
             append_silence(AHEAD_PERIODS, (uint16_t)(certain / AHEAD_PERIODS - 1), flags);
             ahead_ticks = certain;
             play();
+        } else if ((cruised = begin_cruise()) != 0) {
+            play();
         }
     } else {
         stage = STAGE_LEAD;
@@ -786,6 +810,7 @@ static void start_now(void)
         play();
     }
     plan();
+    profile.cruise_pulses -= cruised;
     fill();
     if (!playing)
         play();
