@@ -13,7 +13,8 @@
 #define RUN_MAX_PULSES 128u
 #define ODD_GROUP_LEAST 16u /* pulses of a group that are not a power of two */
 #define REST_PULSES 64u /* the least that is left for a fast ramp's last run */
-#define GROUP_MAX_TICKS 49152u /* so that 32 bits hold their sum, and a command can be cut soon */
+#define GROUP_MAX_TICKS 60000u /* below 65,536 also where it grows more than expected ... */
+#define GROUP_MAX_STEEP_TICKS 49152u /* ... by up to a third, in a steep ramp */
 #define STEEP_BITS 36u /* of C: first intervals below 16,384 ticks */
 /* Runs: the interrupt's cycles for two segments, the planner's, and as much for others; and those of each pulse. */
 #define RUN_TICKS 500u
@@ -134,7 +135,8 @@ static NOINLINE uint16_t choose_group(ramp_t *ramp, uint32_t change, uint32_t mo
         most_change -= most_change >> 2;
     }
     uint16_t pulses = (uint16_t)(1u << log2);
-    uint16_t most_ticks = (uint16_t)(GROUP_MAX_TICKS >> log2);
+    uint16_t most_ticks = ramp->steep > 1 ? GROUP_MAX_STEEP_TICKS : GROUP_MAX_TICKS;
+    most_ticks = (uint16_t)(most_ticks >> log2);
     change <<= log2;
     while (log2 && (log2 > ramp->most_log2 || ticks > most_ticks || change > most_change)) {
         change >>= 1;
