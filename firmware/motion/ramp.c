@@ -212,7 +212,7 @@ void ramp_begin_harmonic(ramp_t *ramp, const ramp_constants_t *constants, uint32
 }
 
 /* The mean of 1 / (1 + x) over n pulses, x from -p / 2 to p / 2 (not quite: at the pulses), is 1 + second * (p^2 +
- * fourth * p^4 + sixth * p^6), in 1 / 2^32. For n = 1 to 8, and roughly for those from 8, 16, 32 and 64 on. */
+ * fourth * p^4 + sixth * p^6), in 1 / 2^32. For n = 2 to 8, and roughly for those from 8, 16, 32 and 64 on. */
 typedef struct {
     uint32_t second, fourth, sixth;
 } series_t;
