@@ -162,8 +162,6 @@ static NOINLINE uint16_t choose_group(ramp_t *ramp, uint32_t change, uint32_t mo
             pulses >>= 1;
         return pulses;
     }
-    if (left > UINT8_MAX)
-        left &= 0xFFFC; /* as many runs as a byte counts */
     uint16_t odd = (uint16_t)(left & (ramp->run_pulses - 1u));
     if (odd == left)
         ramp->rest = true;

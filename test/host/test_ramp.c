@@ -126,6 +126,31 @@ static void test_pieces_of_a_ramp_add_up_to_the_whole(void)
     }
 }
 
+/* However many pulses are left: the runs of a group are as many pulses as the group, and last as long. */
+static void test_the_runs_of_a_group_add_up_to_it(void)
+{
+    for (uint16_t left = 1; left < 700; left = (uint16_t)(left + (left < 300 ? 7 : 1))) {
+        for (uint8_t step = 1; step <= 101; step += 50) {
+            ramp_begin_harmonic(&ramp, &constants, left < 500 ? 6000000 : 2000000, step, false, UINT32_MAX >> 1);
+            ramp_time_t sum;
+            (void)ramp_next(&ramp, &constants, 5000, &sum, &block); /* a large one first */
+            uint16_t group = ramp_next(&ramp, &constants, left, &sum, &block);
+            TEST_ASSERT_TRUE(group >= 1 && group <= left);
+            if (block.runs == 0)
+                continue;
+            TEST_ASSERT_EQUAL_UINT16(group, (uint16_t)(block.runs * block.pulses));
+            uint32_t top = block.top_q16, sum_q16 = 0;
+            int32_t slope = block.slope_q16;
+            for (uint8_t i = 0; i < block.runs; i++) {
+                sum_q16 += (top + 65536u) * block.pulses;
+                top += (uint32_t)slope;
+                slope += block.curve_q16;
+            }
+            TEST_ASSERT_UINT32_WITHIN(1311, sum.ticks << 16 | sum.frac_q16, sum_q16); /* a fiftieth of a tick */
+        }
+    }
+}
+
 /* HAR-010, HAR-011, SLO-001 */
 static void test_the_interval_at_a_speed_is_300000_us_by_rpm(void)
 {
@@ -265,6 +290,32 @@ static void test_every_interval_of_usual_ramps_is_within_a_thousandth_or_one_tic
     }
 }
 
+/* SLO-005. Where pulses have runs of their own they are within half a percent, and none is slower than slow speed. */
+static void test_a_steep_ramp_begins_at_slow_speed(void)
+{
+    case_t c = {.faster = 1, .factor_log2 = 6, .rpm = SLOW_RPM, .pulses = 300};
+    for (c.centi = 3000; c.centi < 30000; c.centi += 100) {
+        exact_ramp_t law;
+        exact_of(&law, &c);
+        begin(&c);
+        unsigned alone = 0;
+        for (uint32_t k = 0; k < c.pulses;) {
+            ramp_time_t sum;
+            uint16_t group = ramp_next(&ramp, &constants, c.pulses - k, &sum, &block);
+            for (uint16_t i = 0; i < group; i++, k++) {
+                long double played = played_interval(&sum, group, i);
+                TEST_ASSERT_TRUE(played <= 7500);
+                if (group > 1 && block.runs == group) {
+                    long double exact = exact_ramp_interval(&law, k);
+                    TEST_ASSERT_TRUE(fabsl(played - exact) <= exact / 200 + 1);
+                    alone++;
+                }
+            }
+        }
+        TEST_ASSERT_TRUE(alone > 0);
+    }
+}
+
 /* LIN-018 */
 static void test_axes_whose_speed_and_acceleration_are_scaled_alike_arrive_together(void)
 {
@@ -285,6 +336,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_ramps_take_the_time_that_their_law_says);
     RUN_TEST(test_pieces_of_a_ramp_add_up_to_the_whole);
+    RUN_TEST(test_the_runs_of_a_group_add_up_to_it);
     RUN_TEST(test_the_interval_at_a_speed_is_300000_us_by_rpm);
     RUN_TEST(test_speed_and_interval_are_each_others_inverse);
     RUN_TEST(test_the_linear_constant_follows_motor_and_acceleration);
@@ -292,6 +344,7 @@ int main(void)
     RUN_TEST(test_the_sums_of_the_table_are_those_of_the_law);
     RUN_TEST(test_the_law_in_closed_form_is_the_sum_of_its_intervals);
     RUN_TEST(test_every_interval_of_usual_ramps_is_within_a_thousandth_or_one_tick);
+    RUN_TEST(test_a_steep_ramp_begins_at_slow_speed);
     RUN_TEST(test_axes_whose_speed_and_acceleration_are_scaled_alike_arrive_together);
 #endif
     return UNITY_END();
