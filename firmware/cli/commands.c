@@ -45,7 +45,7 @@ static status_t command_read_ahead(const char *rest)
     status_t status = motion_syntax_end(&ahead);
     if (status == STATUS_OK && !ahead.single) {
         status = queue_add(&ahead.command);
-        queue_poll(); /* at once: everything else can wait */
+        /* it begins at once: everything else can wait */
     }
     if (status == STATUS_OK) {
         motion_syntax_keep(&ahead, &session);

@@ -22,11 +22,10 @@ void engine_init(void); /* takes over the settings: motor, microsteps, slow spee
 /* Whether this command could be executed: its period and pulse width fit, its count does not overflow. */
 status_t engine_check(const motion_command_t *command);
 
-/* True when engine_submit() would take a command (nothing running, or the running one is the only one taken). */
-bool engine_can_accept(void);
-
-/* Takes a command that engine_check() passed. It starts at once, or follows the running one. */
-void engine_submit(const motion_command_t *command);
+/* What comes next: a command that engine_check() passed, or null. It begins at once at standstill, otherwise after the
+ * running one; its values are taken when it is planned, not long before, and may change until then. */
+void engine_offer(const motion_command_t *command);
+uint8_t engine_commands_begun(void); /* taken from the offers since boot, modulo 256 */
 
 /* Keeps the segment ring filled. Call often; returns true if it did some work. */
 bool engine_poll(void);
@@ -36,7 +35,7 @@ uint8_t engine_commands_ended(void);
 
 void engine_stop(void);                                     /* S: no further pulse; everything taken is dropped */
 void engine_stop_graceful(accel_code_t decel, bool linear); /* s: ramp down from the present speed, drop the rest */
-void engine_next(void);                                     /* N: end the running command now */
+bool engine_next(void);                                     /* N: end the running command now */
 void engine_next_graceful(void);                            /* n: end it with its own deceleration */
 
 /* One pulse, at once; ignored unless in STANDBY. */

@@ -1,84 +1,352 @@
 #include "queue/queue.h"
+#include "base/inline.h"
 #include "motion/engine.h"
 #include "queue/session.h"
 #include "settings.h"
+#include <string.h>
+
+enum { NONE = 0xFF }; /* no position */
+
+typedef enum { RUN_NOTHING, RUN_LOOP, RUN_ARRAY } run_t;
 
 static motion_command_t entries[QUEUE_POSITIONS];
+static uint8_t array[QUEUE_ARRAY];
 static uint8_t next_available; /* 1..30 */
 static uint8_t pending;        /* 0..30: the entries before it */
-static uint8_t submitted;      /* commands given to the engine since boot, modulo 256 */
+static uint8_t preempting;     /* position that comes before all others, or NONE */
+static bool cut_due;           /* what runs still has to be ended for it */
+static uint8_t executing;      /* position of the command begun last */
+static uint8_t begun;          /* engine_commands_begun() that `executing` belongs to */
 
-/* So many entries before the next available one, at most 60. */
-static uint8_t position_before(uint8_t entries_back)
-{
-    uint8_t position = (uint8_t)(next_available + 2 * QUEUE_LAST - entries_back);
-    while (position > QUEUE_LAST) {
-        position = (uint8_t)(position - QUEUE_LAST);
-    }
-    return position;
-}
+static run_t run;
+static uint8_t at;         /* comes next: of the loop a position, of the array an entry */
+static uint8_t bounds[2];  /* of the loop, by queue_bound_t; 0: not known */
+static uint16_t passes;    /* still to be made; 0: endless */
+static bool last_of_loop;  /* one more command, then it ends */
 
-void queue_init(void)
+static motion_command_t undo; /* what was at ... */
+static uint8_t undo_position; /* ... before the last change; 0: nothing to be taken back */
+static bool undo_added;       /* it was a new entry */
+
+static void revolution(motion_command_t *seed)
 {
-    motion_command_t *seed = &entries[0];
     session_template(&session, seed);
     seed->count = settings.steps_per_rev;
     seed->flags &= (uint8_t)~MOTION_PULSES;
     if (settings.direction != 0) {
         seed->flags |= MOTION_CCW;
     }
-    uint8_t *bytes = (uint8_t *)entries;
-    for (uint16_t i = 0; i < sizeof entries - sizeof *seed; i++) {
-        bytes[i + sizeof *seed] = bytes[i]; /* each entry from the one before it */
-    }
-    next_available = QUEUE_FIRST;
-    pending = 0;
-    submitted = engine_commands_ended();
 }
 
-status_t queue_add(const motion_command_t *command)
+static uint8_t after(uint8_t position)
 {
-    if (pending == QUEUE_LAST) {
-        return STATUS_QUEUE_FULL;
+    return position == QUEUE_LAST ? QUEUE_FIRST : (uint8_t)(position + 1);
+}
+
+static void end_loop(void)
+{
+    run = RUN_NOTHING;
+    last_of_loop = false;
+    bounds[QUEUE_LOOP_START] = bounds[QUEUE_LOOP_FINISH] = 0;
+    passes = 0;
+}
+
+/* The command that comes next; NONE if there is none. */
+static uint8_t choose(void)
+{
+    if (preempting != NONE) {
+        return preempting;
     }
-    entries[next_available] = *command;
-    next_available = next_available == QUEUE_LAST ? QUEUE_FIRST : (uint8_t)(next_available + 1);
-    pending++;
-    return STATUS_OK;
+    if (run == RUN_ARRAY && array[at] == 0) { /* also where it has been edited meanwhile */
+        at = 0;
+        if (array[0] == 0) {
+            end_loop();
+        }
+    }
+    if (run != RUN_NOTHING) {
+        return run == RUN_LOOP ? at : array[at];
+    }
+    if (pending == 0) {
+        return NONE;
+    }
+    uint8_t position = (uint8_t)(next_available - pending);
+    return position < QUEUE_FIRST || position > QUEUE_LAST ? (uint8_t)(position + QUEUE_LAST) : position;
+}
+
+static void end_pass(uint8_t first)
+{
+    at = first;
+    if (passes != 0 && --passes == 0) {
+        end_loop();
+    }
+}
+
+/* What was chosen has begun. */
+static void advance(void)
+{
+    executing = choose();
+    if (preempting != NONE) {
+        preempting = NONE;
+        cut_due = false;
+    } else if (last_of_loop) {
+        end_loop();
+    } else if (run == RUN_LOOP) {
+        if (at == bounds[QUEUE_LOOP_FINISH]) {
+            end_pass(bounds[QUEUE_LOOP_START]);
+        } else {
+            at = after(at);
+        }
+    } else if (run == RUN_ARRAY) {
+        at++;
+        if (at == QUEUE_ARRAY || array[at] == 0) {
+            end_pass(0);
+        }
+    } else {
+        pending--;
+    }
+}
+
+/* Accounts for what the engine has begun; before anything changes what is chosen. */
+static NOINLINE bool note_begun(void)
+{
+    if (begun == engine_commands_begun()) {
+        return false;
+    }
+    begun++;
+    advance();
+    return true;
+}
+
+/* True if it has begun: at standstill that is at once. */
+static NOINLINE bool offer(void)
+{
+    const uint8_t position = choose();
+    engine_offer(position == NONE ? 0 : &entries[position]);
+    return note_begun();
 }
 
 bool queue_poll(void)
 {
-    if (pending == 0 || !engine_can_accept()) {
-        return false;
+    const bool changed = note_begun();
+    if (cut_due && engine_next()) {
+        cut_due = false;
     }
-    engine_submit(&entries[position_before(pending)]);
-    pending--;
-    submitted++;
-    return true;
+    return offer() || changed;
+}
+
+void queue_init(void)
+{
+    revolution(&entries[0]);
+    uint8_t *bytes = (uint8_t *)entries;
+    for (uint16_t i = 0; i < sizeof entries - sizeof entries[0]; i++) {
+        bytes[i + sizeof entries[0]] = bytes[i]; /* each entry from the one before it */
+    }
+    memset(array, 0, sizeof array);
+    next_available = QUEUE_FIRST;
+    pending = 0;
+    preempting = NONE;
+    cut_due = false;
+    undo_position = 0;
+    begun = engine_commands_begun();
+    end_loop();
+}
+
+void queue_clear(void)
+{
+    for (uint8_t position = QUEUE_FIRST; position <= QUEUE_LAST; position++) {
+        revolution(&entries[position]);
+    }
+    undo_position = 0;
+}
+
+/* -- what is written --------------------------------------------------------------------------------------------- */
+
+static void write(uint8_t position, const motion_command_t *command, bool added)
+{
+    undo = entries[position];
+    undo_position = position;
+    undo_added = added;
+    entries[position] = *command;
+}
+
+status_t queue_add(const motion_command_t *command)
+{
+    (void)note_begun();
+    if (pending == QUEUE_LAST) {
+        return STATUS_QUEUE_FULL;
+    }
+    write(next_available, command, true);
+    next_available = after(next_available);
+    pending++;
+    (void)offer();
+    return STATUS_OK;
+}
+
+void queue_edit(uint8_t position, const motion_command_t *command)
+{
+    write(position, command, false);
+}
+
+status_t queue_undo(void)
+{
+    (void)note_begun();
+    const uint8_t position = undo_position;
+    if (position == 0 || position == queue_executing_position()) {
+        return STATUS_NOTHING_TO_UNDO;
+    }
+    entries[position] = undo;
+    undo_position = 0;
+    if (undo_added) {
+        next_available = position;
+        if (pending != 0) { /* the newest one: still among them */
+            pending--;
+        }
+    }
+    (void)offer();
+    return STATUS_OK;
+}
+
+/* -- preemption -------------------------------------------------------------------------------------------------- */
+
+void queue_preempt(uint8_t position)
+{
+    (void)note_begun();
+    preempting = position;
+    cut_due = true;
+    (void)queue_poll();
+}
+
+void queue_preempt_with(uint8_t position, const motion_command_t *command)
+{
+    entries[position] = *command;
+    queue_preempt(position);
+}
+
+static bool is_continuous(void)
+{
+    (void)note_begun();
+    return executing == QUEUE_CONTINUOUS && queue_is_executing();
+}
+
+void queue_follow(const motion_command_t *command)
+{
+    motion_command_t *continuous = &entries[QUEUE_CONTINUOUS];
+    if (preempting == QUEUE_CONTINUOUS || is_continuous()) {
+        continuous->velocity = command->velocity;
+        continuous->accel = command->accel;
+        continuous->flags = (uint8_t)((continuous->flags & ~SESSION_FLAGS) | (command->flags & SESSION_FLAGS));
+        queue_preempt(QUEUE_CONTINUOUS);
+    }
+}
+
+/* -- loops ------------------------------------------------------------------------------------------------------- */
+
+static void begin_run(run_t what, uint8_t first)
+{
+    (void)note_begun();
+    run = what;
+    at = first;
+    last_of_loop = false;
+    (void)offer();
+}
+
+status_t queue_loop_bound(queue_bound_t bound, uint8_t position)
+{
+    if (position < QUEUE_FIRST || position > QUEUE_LAST || position == bounds[1 - bound]) {
+        return STATUS_RANGE;
+    }
+    bounds[bound] = position;
+    if (bounds[1 - bound] != 0 && run != RUN_LOOP) {
+        begin_run(RUN_LOOP, bounds[QUEUE_LOOP_START]);
+    }
+    return STATUS_OK;
+}
+
+void queue_loop_from_first(uint8_t finish)
+{
+    bounds[QUEUE_LOOP_START] = QUEUE_FIRST;
+    bounds[QUEUE_LOOP_FINISH] = finish;
+    begin_run(RUN_LOOP, QUEUE_FIRST);
+}
+
+void queue_loop_passes(uint16_t count)
+{
+    passes = count;
+}
+
+void queue_array_set(uint8_t entry, uint8_t position)
+{
+    (void)note_begun();
+    array[entry] = position;
+    (void)offer();
+}
+
+uint8_t queue_array(uint8_t entry)
+{
+    return array[entry];
+}
+
+status_t queue_array_run(uint16_t count)
+{
+    if (array[0] == 0) {
+        return STATUS_ARRAY_EMPTY;
+    }
+    end_loop();
+    passes = count;
+    begin_run(RUN_ARRAY, 0);
+    return STATUS_OK;
+}
+
+void queue_loop_end(void)
+{
+    const bool continuous = is_continuous();
+    end_loop();
+    (void)offer();
+    if (continuous) {
+        engine_next_graceful();
+    }
+}
+
+/* -- ends -------------------------------------------------------------------------------------------------------- */
+
+static void forget(void)
+{
+    end_loop();
+    pending = 0;
+    preempting = NONE;
+    cut_due = false;
+    engine_offer(0);
 }
 
 void queue_stop(void)
 {
-    pending = 0;
+    (void)note_begun();
+    forget();
     engine_stop();
-    submitted = engine_commands_ended();
 }
 
 void queue_stop_graceful(accel_code_t decel, bool linear)
 {
-    pending = 0;
+    (void)note_begun();
+    forget();
     engine_stop_graceful(decel, linear);
-    submitted = engine_commands_ended();
+}
+
+/* A loop that continuous motion has interrupted executes one more command. */
+static void end_continuous(void)
+{
+    last_of_loop = run != RUN_NOTHING && is_continuous();
 }
 
 void queue_next(void)
 {
-    engine_next();
+    end_continuous();
+    (void)engine_next();
 }
 
 void queue_next_graceful(void)
 {
+    end_continuous();
     engine_next_graceful();
 }
 
@@ -92,14 +360,14 @@ uint8_t queue_pending(void)
     return pending;
 }
 
+bool queue_is_executing(void)
+{
+    return engine_commands_ended() != engine_commands_begun();
+}
+
 uint8_t queue_executing_position(void)
 {
-    /* The engine ends commands in the order in which it took them: the oldest one not ended is the one that runs. */
-    const uint8_t not_ended = (uint8_t)(submitted - engine_commands_ended());
-    if (not_ended == 0 || not_ended > QUEUE_LAST) {
-        return 0;
-    }
-    return position_before((uint8_t)(pending + not_ended));
+    return queue_is_executing() ? executing : 0;
 }
 
 const motion_command_t *queue_entry(uint8_t position)

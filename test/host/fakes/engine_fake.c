@@ -43,15 +43,25 @@ bool engine_poll(void)
     return false;
 }
 
-bool engine_can_accept(void)
+void engine_fake_begin(void)
 {
-    return engine_fake.accepts;
+    engine_fake.submitted[engine_fake.submitted_count++ % ENGINE_FAKE_COMMANDS] = *engine_fake.offered;
+    engine_fake.sent_at_submit = terminal_port_fake_sent();
+    engine_fake.offered = NULL;
+    engine_fake.begun++;
 }
 
-void engine_submit(const motion_command_t *command)
+void engine_offer(const motion_command_t *command)
 {
-    engine_fake.submitted[engine_fake.submitted_count++ % ENGINE_FAKE_COMMANDS] = *command;
-    engine_fake.sent_at_submit = terminal_port_fake_sent();
+    engine_fake.offered = command;
+    if (engine_fake.accepts && command != NULL) {
+        engine_fake_begin();
+    }
+}
+
+uint8_t engine_commands_begun(void)
+{
+    return engine_fake.begun;
 }
 
 uint8_t engine_commands_ended(void)
@@ -62,6 +72,7 @@ uint8_t engine_commands_ended(void)
 void engine_stop(void)
 {
     engine_fake.stops++;
+    engine_fake.ended = engine_fake.begun;
 }
 
 void engine_stop_graceful(accel_code_t decel, bool linear)
@@ -71,9 +82,10 @@ void engine_stop_graceful(accel_code_t decel, bool linear)
     engine_fake.graceful_linear = linear;
 }
 
-void engine_next(void)
+bool engine_next(void)
 {
     engine_fake.nexts++;
+    return !engine_fake.cannot_end;
 }
 
 void engine_next_graceful(void)

@@ -12,13 +12,16 @@
 
 typedef struct {
     /* what the test sets */
-    bool accepts; /* engine_can_accept() */
+    bool accepts;    /* it begins what it is offered at once, as at standstill; otherwise engine_fake_begin() does */
+    bool cannot_end; /* engine_next() comes at a moment when nothing can be cut */
     motion_state_t state;
     int32_t position;
     uint32_t rpm, cycle_us; /* engine_velocity() */
     uint8_t faults;
     uint8_t ended;
     /* what was asked */
+    const motion_command_t *offered; /* and not begun */
+    uint8_t begun;
     motion_command_t submitted[ENGINE_FAKE_COMMANDS];
     unsigned submitted_count;
     unsigned stops, nexts, nexts_graceful, stops_graceful;
@@ -32,6 +35,7 @@ typedef struct {
 
 extern engine_fake_t engine_fake;
 
+void engine_fake_begin(void); /* what it is offered: what ran has ended, or is about to */
 void engine_fake_reset(void); /* accepts, in STANDBY, GAP on, nothing recorded */
 
 #endif
