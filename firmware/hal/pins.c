@@ -29,6 +29,9 @@ void pins_init(void)
     DDRC = ddr_c;
     DDRD = ddr_d;
 
+    EICRA = 1 << ISC11; /* INT1, the sync pin: falling edges (section 13.2.1) */
+    EIMSK = 1 << INT1;
+
     /* 1 MHz on OC2A from Timer2 alone: CTC, toggle every 8 cycles (datasheet section 18.7.2). */
     OCR2A = 7;
     TCCR2A = 1 << COM2A0 | 1 << WGM21;

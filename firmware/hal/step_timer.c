@@ -57,7 +57,8 @@ void step_port_dir(bool level)
         PORTB &= (uint8_t)~(1 << 5);
 }
 
-void step_port_start(void)
+/* The timer stands ready: all but its clock. */
+void step_port_hold(void)
 {
     step_port_init();
     set_compare(STEP_PORT_LEAD_TICKS + LEAD_BEGIN - 1, SEGMENT_SILENT);
@@ -80,7 +81,32 @@ void step_port_start(void)
     step_idle = 0;
     TIFR1 = 1 << TOV1;
     TIMSK1 = 1 << TOIE1;
+}
+
+void step_port_start(void)
+{
+    step_port_hold();
     TCCR1B = RUNNING;
+}
+
+/* Held: ready, and nobody has given it a clock. */
+static inline void release(void)
+{
+    if (TIMSK1 && TCCR1B == MODE15_B)
+        TCCR1B = RUNNING;
+}
+
+void step_port_release(void)
+{
+    uint8_t state = atomic_begin();
+    release();
+    atomic_end(state);
+}
+
+/* The sync pin has fallen. */
+ISR(INT1_vect)
+{
+    release();
 }
 
 step_snapshot_t step_port_snapshot(void)
@@ -117,6 +143,11 @@ void step_port_halt(void)
         const segment_t *before = segment_at((uint8_t)(tail - 2 * SEGMENT_BYTES));
         bool fast = loaded->top < SEGMENT_EARLY1_BELOW_TICKS || before->top < SEGMENT_EARLY1_BELOW_TICKS;
         cli();
+        if (TCCR1B == MODE15_B) {
+            TIMSK1 = 0; /* it is held */
+            sei();
+            return;
+        }
         if (tail == step_tail && !(TIFR1 & 1 << TOV1)) {
             if (fast) {
                 /* A pulse is due or there, and over in a moment: freeze right behind it. */

@@ -25,12 +25,12 @@ enum {
     MOTION_CCW = 1 << 0,    /* direction: counter-clockwise */
     MOTION_PULSES = 1 << 1, /* count is in pulses, not full steps (shown as +) */
     MOTION_LINEAR = 1 << 2, /* linear ramp, otherwise harmonic (shown as *) */
-    MOTION_SYNC = 1 << 3,   /* hold until a sync release (shown as s); stored, not yet held */
+    MOTION_SYNC = 1 << 3,   /* held until a sync release (shown as s) */
     MOTION_CYCLE = 1 << 4,  /* velocity is a cycle in microseconds per full step, otherwise RPM */
 };
 
 typedef struct {
-    uint32_t count;         /* full steps, or pulses: 1..2^32-1 */
+    uint32_t count;         /* full steps, or pulses: 1..2^32-1; 0: until it is ended */
     uint32_t velocity;      /* RPM, or cycle in us with MOTION_CYCLE: 1..2^32-1 */
     uint32_t start_wait_us; /* 0..2^32-1 */
     accel_code_t accel;

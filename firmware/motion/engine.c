@@ -44,8 +44,7 @@ static profile_basis_t basis;
 static uint16_t width_ticks; /* of a pulse */
 static motion_command_t command; /* being emitted or played */
 static profile_t profile;        /* what is left of it to be emitted */
-static motion_command_t next;    /* taken, not begun */
-static bool next_taken;
+static const motion_command_t *next; /* offered, not begun; null: nothing */
 static bool playing; /* the timer runs (it may play silence) */
 static stage_t stage;
 static ramp_t ramp;
@@ -65,13 +64,14 @@ static uint16_t closing_ticks;   /* ... and these */
 static uint8_t tail_offset;      /* its tail segment, while stage is REST, GAP or END */
 static bool tail_valid;          /* a command can still be joined to it */
 static bool tail_awaited;        /* it has not begun yet: its command has not ended */
-static bool joined;              /* the ring holds the end of one command and the beginning of the next one ... */
+static uint8_t joined;           /* the ring holds the end of so many commands and the beginning of the next one ... */
 static uint8_t joined_offset;    /* ... which begins at the end of this segment */
 static bool tail_fast;           /* too fast for a tail: a following command lengthens the last run instead */
 static uint8_t last_run_offset;
 
 static int32_t emitted; /* position, in pulses, when all that is in the ring has been played */
-static uint8_t ended;
+static uint8_t begun, ended;   /* commands, modulo 256 */
+static bool endless;           /* the command goes on until it is cut */
 static uint8_t faults;
 static uint32_t certain_centi; /* steepest linear ramp whose first interval is longer than AHEAD_LONG_TICKS */
 static bool gap_on = true;
@@ -178,8 +178,10 @@ static bool has_begun(uint8_t offset)
 /* The command whose closing interval has begun its tail has ended. */
 static void look_for_end(void)
 {
-    if (joined && has_begun(joined_offset))
-        joined = false;
+    if (joined && has_begun(joined_offset)) {
+        ended = (uint8_t)(ended + joined);
+        joined = 0;
+    }
     if (tail_awaited && has_begun(tail_offset)) {
         tail_awaited = false;
         ended++;
@@ -601,7 +603,7 @@ static bool emit_other(void)
         uint32_t chunks = us >> (PROFILE_CHUNK_LOG2 - 4);
         uint32_t ticks = (us & (PROFILE_CHUNK_TICKS / TICKS_PER_US - 1)) * TICKS_PER_US;
         ramp_state = MOTION_STANDBY;
-        set_interval(chunks, ticks, true);
+        set_interval(chunks, ticks + DIR_SETUP_TICKS + width_ticks, true);
         stage = STAGE_RUN;
         return true;
     }
@@ -625,6 +627,8 @@ static bool emit_other(void)
             begin_closing();
         } else if (state == MOTION_CRUISE) {
             ramp_state = state;
+            if (endless && at_most < UINT32_MAX / 2)
+                p->cruise_pulses += UINT32_MAX / 2;
             emit_cruise(at_most);
         } else {
             begin_ramp(state);
@@ -639,7 +643,7 @@ static bool emit_other(void)
         stage = STAGE_GAP;
         return true;
     case STAGE_GAP:
-        if (next_taken)
+        if (next)
             return false; /* it will be joined */
         ramp_state = MOTION_STANDBY;
         if (gap_on)
@@ -692,9 +696,23 @@ static void begin_ring(void)
     owed = 0;
     carry_q16 = 0;
     dir_due = false;
-    joined = false;
+    joined = 0;
     single = false;
     drop_emission();
+}
+
+/* Takes the values of what is offered. */
+static void take_next(void)
+{
+    command = *next;
+    next = 0;
+    begun++;
+    endless = command.count == 0;
+    if (endless) {
+        command.count = UINT32_MAX; /* its cruise is made longer as it is played */
+        command.extra_pulses = 0;
+        command.flags |= MOTION_PULSES;
+    }
 }
 
 static void plan(void)
@@ -705,14 +723,17 @@ static void plan(void)
 static void play(void)
 {
     playing = true;
-    step_port_start();
+    if (command.flags & MOTION_SYNC)
+        step_port_hold();
+    else
+        step_port_start();
 }
 
 /* The first interval of most profiles is long, whatever the rest turns out to be: then the first pulse need not wait for
  * the planning. Returns how much of that interval may certainly be begun, from few operations; 0: plan first. */
 static uint16_t certain_ticks(void)
 {
-    if (v_in_play != basis.v_slow)
+    if (v_in_play != basis.v_slow || command.flags & MOTION_SYNC)
         return 0;
     if (command.accel == ACCEL_NONE) { /* the cruise interval, or that of the deceleration */
         uint16_t flat = command.decel == ACCEL_NONE ? AHEAD_SHORT_TICKS : AHEAD_LONG_TICKS;
@@ -763,7 +784,7 @@ static void fill(void)
 static uint16_t begin_cruise(void)
 {
     uint8_t factor_log2 = basis.factor_log2;
-    if (command.accel != ACCEL_NONE || command.decel != ACCEL_NONE)
+    if (command.accel != ACCEL_NONE || command.decel != ACCEL_NONE || command.flags & MOTION_SYNC)
         return 0;
     uint32_t cycle_us = profile_cycle_us(&basis, &command);
     uint16_t ticks = (uint16_t)(cycle_us * TICKS_PER_US);
@@ -787,10 +808,9 @@ static void start_now(void)
     uint8_t flags = direction_flags(&command, false);
     uint16_t certain = certain_ticks();
     uint16_t cruised = 0;
-    if (command.start_wait_us < 4096u) {
+    if (command.start_wait_us < 3072u) {
         uint16_t lead = (uint16_t)(command.start_wait_us * TICKS_PER_US);
-        if (lead < DIR_SETUP_TICKS + width_ticks)
-            lead = (uint16_t)(DIR_SETUP_TICKS + width_ticks);
+        lead = (uint16_t)(lead + DIR_SETUP_TICKS + width_ticks);
         append(1, (uint16_t)(lead - 1), width_ticks, flags);
         add_pulses(flags, 1);
         stage = STAGE_RUN;
@@ -807,7 +827,8 @@ static void start_now(void)
         emit(); /* sets the interval up, then its silence, then the pulse */
         emit();
         emit();
-        play();
+        if (!(command.flags & MOTION_SYNC))
+            play();
     }
     plan();
     profile.cruise_pulses -= cruised;
@@ -864,17 +885,17 @@ static bool tail_is_over(void)
 static void join_next(void)
 {
     uint32_t ticks = ticks_to_tail();
-    uint16_t needed = next.flags & MOTION_LINEAR ? JOIN_LINEAR_TICKS : JOIN_TICKS;
-    if (next.accel == ACCEL_NONE && next.decel == ACCEL_NONE)
+    uint16_t needed = next->flags & MOTION_LINEAR ? JOIN_LINEAR_TICKS : JOIN_TICKS;
+    if (next->accel == ACCEL_NONE && next->decel == ACCEL_NONE)
         needed = JOIN_FLAT_TICKS;
-    bool timely = ticks >= needed;
+    bool timely = ticks >= needed && !(next->flags & MOTION_SYNC);
     if (ticks > JOIN_SOON_TICKS)
         return; /* later */
     if (!timely && !tail_is_over())
         return; /* at its end */
-    bool turns = is_ccw(&next) != is_ccw(&command);
-    uint8_t flags = (uint8_t)(MOTION_STOP | direction_flags(&next, turns));
-    uint32_t wait = wait_ticks(next.start_wait_us);
+    bool turns = is_ccw(next) != is_ccw(&command);
+    uint8_t flags = (uint8_t)(MOTION_STOP | direction_flags(next, turns));
+    uint32_t wait = wait_ticks(next->start_wait_us);
     if (timely) {
         uint8_t offset = tail_offset;
         bool done;
@@ -893,17 +914,15 @@ static void join_next(void)
             return; /* not at this moment */
         joined_offset = offset;
     }
-    command = next;
-    next_taken = false;
+    take_next();
     if (!timely) {
-        if (step_idle)
+        if (step_idle || command.flags & MOTION_SYNC) /* held, it stands still */
             expire_gap();
         start_now();
         return;
     }
     drop_emission();
-    joined = true;
-    ended++;
+    joined++;
     /* Longer than the gap the wait means a start from slow speed. */
     if (wait >> PROFILE_CHUNK_LOG2 >= closing_chunks && wait > (closing_chunks << PROFILE_CHUNK_LOG2) + closing_ticks)
         expire_gap();
@@ -923,20 +942,23 @@ status_t engine_check(const motion_command_t *c)
     return profile_check(&basis, c, settings.pulse_us);
 }
 
-bool engine_can_accept(void)
+void engine_offer(const motion_command_t *offered)
 {
-    return !next_taken;
+    next = offered;
+    if (next && !playing) {
+        take_next();
+        start_now();
+    }
 }
 
-void engine_submit(const motion_command_t *submitted)
+uint8_t engine_commands_begun(void)
 {
-    if (!playing) {
-        command = *submitted;
-        start_now();
-    } else {
-        next = *submitted;
-        next_taken = true;
-    }
+    return begun;
+}
+
+void engine_release(void)
+{
+    step_port_release();
 }
 
 NOINLINE bool engine_poll(void)
@@ -955,9 +977,8 @@ NOINLINE bool engine_poll(void)
             playing = false;
             tail_valid = false;
             single = false;
-            if (next_taken) {
-                next_taken = false;
-                command = next;
+            if (next) {
+                take_next();
                 start_now();
             } else {
                 expire_gap();
@@ -970,7 +991,7 @@ NOINLINE bool engine_poll(void)
         }
         worked = true;
     }
-    if (next_taken && playing && !single && (stage == STAGE_GAP || stage == STAGE_END || stage == STAGE_REST))
+    if (next && playing && !single && (stage == STAGE_GAP || stage == STAGE_END || stage == STAGE_REST))
         join_next();
     /* Until the ring is half full nothing else is as urgent, within reason; then a step at a time. */
     uint8_t rounds = 6;
@@ -1001,9 +1022,9 @@ static bool running(void)
 static void drop_next(void)
 {
     look_for_end();
-    ended = (uint8_t)(ended + next_taken + joined);
-    next_taken = false;
-    joined = false;
+    ended = (uint8_t)(ended + joined);
+    next = 0;
+    joined = 0;
 }
 
 /* Freezes the pulse train where it is. */
@@ -1092,6 +1113,7 @@ static void end_command(accel_code_t decel, bool linear)
     profile.cruise.ticks_q8 = (ticks & (PROFILE_CHUNK_TICKS - 1)) << 8;
     if (profile.decel_pulses == 0)
         profile.cruise_pulses = 1; /* the closing interval */
+    endless = false;
     ramp_state = MOTION_STANDBY;
     stage = STAGE_RUN;
 }
@@ -1102,18 +1124,22 @@ void engine_stop_graceful(accel_code_t decel, bool linear)
     end_command(decel, linear);
 }
 
-void engine_next(void)
+bool engine_next(void)
 {
     look_for_end();
-    if (!joined) /* else it ends within JOIN_SOON_TICKS */
-        end_command(ACCEL_NONE, false);
+    if (joined) /* it ends within JOIN_SOON_TICKS */
+        return false;
+    end_command(ACCEL_NONE, false);
+    return true;
 }
 
-void engine_next_graceful(void)
+bool engine_next_graceful(void)
 {
     look_for_end();
-    if (!joined)
-        end_command(command.decel, (command.flags & MOTION_LINEAR) != 0);
+    if (joined)
+        return false;
+    end_command(command.decel, (command.flags & MOTION_LINEAR) != 0);
+    return true;
 }
 
 /* Needs no plan: a ring of one segment. A pulse takes 13 us and is waited for before the next one: all of them are made,
@@ -1122,7 +1148,7 @@ void engine_single_pulse(bool ccw)
 {
     if (single) {
         step_port_finish();
-    } else if (running() || next_taken) {
+    } else if (running() || next) {
         return;
     }
     begin_ring();

@@ -27,6 +27,10 @@ status_t engine_check(const motion_command_t *command);
 void engine_offer(const motion_command_t *command);
 uint8_t engine_commands_begun(void); /* taken from the offers since boot, modulo 256 */
 
+/* Lets a command with MOTION_SYNC that stands ready begin: its first pulse comes a fixed time later, and its start wait.
+ * The sync pin does the same by itself. With nothing held nothing happens. */
+void engine_release(void);
+
 /* Keeps the segment ring filled. Call often; returns true if it did some work. */
 bool engine_poll(void);
 
@@ -35,8 +39,8 @@ uint8_t engine_commands_ended(void);
 
 void engine_stop(void);                                     /* S: no further pulse; everything taken is dropped */
 void engine_stop_graceful(accel_code_t decel, bool linear); /* s: ramp down from the present speed, drop the rest */
-bool engine_next(void);                                     /* N: end the running command now */
-void engine_next_graceful(void);                            /* n: end it with its own deceleration */
+bool engine_next(void);                                     /* N: end the running command now; false: ask again later */
+bool engine_next_graceful(void);                            /* n: end it with its own deceleration */
 
 /* One pulse, at once; ignored unless in STANDBY. */
 void engine_single_pulse(bool ccw);

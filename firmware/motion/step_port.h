@@ -17,6 +17,10 @@ void step_port_dir(bool level);
 void step_port_start(void);
 #define STEP_PORT_LEAD_TICKS 16u
 
+/* The same, but the timer stands ready until step_port_release() or a falling edge of the sync pin. */
+void step_port_hold(void);
+void step_port_release(void); /* with nothing held, nothing happens */
+
 /* Stops the timer at once, except that a pulse which has begun or is about to is completed first. No edge comes after
  * the return; step_port_snapshot() then tells where it stopped. */
 void step_port_halt(void);

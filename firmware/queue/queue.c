@@ -14,7 +14,7 @@ static uint8_t array[QUEUE_ARRAY];
 static uint8_t next_available; /* 1..30 */
 static uint8_t pending;        /* 0..30: the entries before it */
 static uint8_t preempting;     /* position that comes before all others, or NONE */
-static bool cut_due;           /* what runs still has to be ended for it */
+static bool (*due)(void);      /* how what runs still has to be ended, as soon as it can be; or null */
 static uint8_t executing;      /* position of the command begun last */
 static uint8_t begun;          /* engine_commands_begun() that `executing` belongs to */
 
@@ -85,9 +85,9 @@ static void end_pass(uint8_t first)
 static void advance(void)
 {
     executing = choose();
+    due = 0;
     if (preempting != NONE) {
         preempting = NONE;
-        cut_due = false;
     } else if (last_of_loop) {
         end_loop();
     } else if (run == RUN_LOOP) {
@@ -128,8 +128,8 @@ static NOINLINE bool offer(void)
 bool queue_poll(void)
 {
     const bool changed = note_begun();
-    if (cut_due && engine_next()) {
-        cut_due = false;
+    if (due && due()) {
+        due = 0;
     }
     return offer() || changed;
 }
@@ -145,7 +145,7 @@ void queue_init(void)
     next_available = QUEUE_FIRST;
     pending = 0;
     preempting = NONE;
-    cut_due = false;
+    due = 0;
     undo_position = 0;
     begun = engine_commands_begun();
     end_loop();
@@ -212,7 +212,7 @@ void queue_preempt(uint8_t position)
 {
     (void)note_begun();
     preempting = position;
-    cut_due = true;
+    due = engine_next;
     (void)queue_poll();
 }
 
@@ -299,12 +299,11 @@ status_t queue_array_run(uint16_t count)
 
 void queue_loop_end(void)
 {
-    const bool continuous = is_continuous();
     end_loop();
-    (void)offer();
-    if (continuous) {
-        engine_next_graceful();
+    if (is_continuous()) {
+        due = engine_next_graceful;
     }
+    (void)queue_poll();
 }
 
 /* -- ends -------------------------------------------------------------------------------------------------------- */
@@ -314,7 +313,7 @@ static void forget(void)
     end_loop();
     pending = 0;
     preempting = NONE;
-    cut_due = false;
+    due = 0;
     engine_offer(0);
 }
 
@@ -332,22 +331,25 @@ void queue_stop_graceful(accel_code_t decel, bool linear)
     engine_stop_graceful(decel, linear);
 }
 
-/* A loop that continuous motion has interrupted executes one more command. */
-static void end_continuous(void)
+/* Where the engine cannot end the running command it ends by itself within 10 ms. If that is not the one begun last, but
+ * continuous motion is, it shall end too; and a loop that it has interrupted executes one more command. */
+static void end_running(bool (*how)(void))
 {
+    (void)note_begun();
+    if (!how() && is_continuous()) {
+        due = how;
+    }
     last_of_loop = run != RUN_NOTHING && is_continuous();
 }
 
 void queue_next(void)
 {
-    end_continuous();
-    (void)engine_next();
+    end_running(engine_next);
 }
 
 void queue_next_graceful(void)
 {
-    end_continuous();
-    engine_next_graceful();
+    end_running(engine_next_graceful);
 }
 
 uint8_t queue_next_position(void)

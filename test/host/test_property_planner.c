@@ -518,6 +518,7 @@ static void check_played(const trial_t *t)
     engine_init();
     int32_t before = engine_position();
     uint8_t ended = engine_commands_ended();
+    uint8_t begun = engine_commands_begun();
 
     motion_command_t commands[3];
     unsigned count = 0;
@@ -548,8 +549,8 @@ static void check_played(const trial_t *t)
 
     unsigned submitted = 0;
     for (;;) {
-        while (submitted < count && engine_can_accept())
-            engine_submit(&commands[submitted++]);
+        while (submitted < count && (uint8_t)(engine_commands_begun() - begun) == submitted)
+            engine_offer(&commands[submitted++]);
         if (!poll())
             break;
     }

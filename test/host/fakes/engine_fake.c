@@ -88,9 +88,10 @@ bool engine_next(void)
     return !engine_fake.cannot_end;
 }
 
-void engine_next_graceful(void)
+bool engine_next_graceful(void)
 {
     engine_fake.nexts_graceful++;
+    return !engine_fake.cannot_end;
 }
 
 void engine_single_pulse(bool ccw)

@@ -17,6 +17,7 @@ static struct {
     uint64_t now;
     uint64_t blocked_until; /* the interrupt is at work */
     bool clocked;
+    bool ready; /* without a clock, until it is released */
     bool counting; /* TOIE1 */
     bool held;     /* interrupts off */
     bool over;     /* TOV1 */
@@ -407,6 +408,7 @@ const player_harm_t *step_player_harm(void)
 
 static void stop_clock(void)
 {
+    p.ready = false;
     p.clocked = false;
 }
 
@@ -421,7 +423,7 @@ void step_port_dir(bool level)
     set_dir(p.now, level);
 }
 
-void step_port_start(void)
+void step_port_hold(void)
 {
     if (p.clocked && p.risen)
         p.harm.cut_pulses++;
@@ -447,7 +449,23 @@ void step_port_start(void)
     step_tail = (uint8_t)(first + SEGMENT_BYTES);
     step_idle = 0;
     p.counting = true;
-    p.clocked = true;
+    p.clocked = false;
+    p.ready = true;
+}
+
+void step_port_release(void)
+{
+    if (p.ready) {
+        p.begin = p.now - LEAD_BEGIN;
+        p.clocked = true;
+        p.ready = false;
+    }
+}
+
+void step_port_start(void)
+{
+    step_port_hold();
+    step_port_release();
 }
 
 void step_port_halt(void)
@@ -457,6 +475,11 @@ void step_port_halt(void)
             p.harm.cut_pulses++;
         stop_clock();
         p.over = false;
+        return;
+    }
+    if (p.ready) {
+        stop_clock();
+        p.counting = false;
         return;
     }
     for (;;) {
