@@ -1,4 +1,6 @@
 #include "queue/queue.h"
+#include "base/inline.h"
+#include "base/zeroed.h"
 #include "motion/engine.h"
 #include "queue/session.h"
 #include "settings.h"
@@ -9,7 +11,7 @@ static uint8_t pending;        /* 0..30: the entries before it */
 static uint8_t submitted;      /* commands given to the engine since boot, modulo 256 */
 
 /* So many entries before the next available one, at most 60. */
-static uint8_t position_before(uint8_t entries_back)
+static NOINLINE uint8_t position_before(uint8_t entries_back)
 {
     uint8_t position = (uint8_t)(next_available + 2 * QUEUE_LAST - entries_back);
     while (position > QUEUE_LAST) {
@@ -32,7 +34,7 @@ void queue_init(void)
         bytes[i + sizeof *seed] = bytes[i]; /* each entry from the one before it */
     }
     next_available = QUEUE_FIRST;
-    pending = 0;
+    AT_BOOT_ZERO(pending);
     submitted = engine_commands_ended();
 }
 
@@ -58,7 +60,7 @@ bool queue_poll(void)
     return true;
 }
 
-void queue_stop(void)
+NOINLINE void queue_stop(void)
 {
     pending = 0;
     engine_stop();
