@@ -156,7 +156,7 @@ static status_t command_ramp(const char *rest)
         ahead.range = motion_syntax_range_flag;
         return STATUS_RANGE;
     }
-    session_set_linear(rest[0] == '1');
+    session_set_linear((uint8_t)(rest[0] - '0'));
     return STATUS_OK;
 }
 

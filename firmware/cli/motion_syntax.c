@@ -126,7 +126,7 @@ static NOINLINE void close_parameter(motion_syntax_t *syntax)
     uint32_t value = syntax->value;
     uint8_t flag = 0; /* of the command, that this parameter sets */
     uint8_t on = 0;   /* or clears, if 0 */
-    if ((uint8_t)(number & (HAS_POINT | HAS_DIGIT)) == HAS_POINT) {
+    if (has(syntax, HAS_POINT | HAS_DIGIT) == HAS_POINT) {
         refuse(syntax, STATUS_NUMBER_MISSING);
         return;
     }
@@ -134,24 +134,21 @@ static NOINLINE void close_parameter(motion_syntax_t *syntax)
     case PARAMETER_COUNT:
         command->count = value;
         flag = MOTION_CCW;
-        on = (uint8_t)(number & (HAS_DIGIT | HAS_MINUS)) ? number & HAS_MINUS : settings.direction;
+        on = has(syntax, HAS_DIGIT | HAS_MINUS) ? number & HAS_MINUS : settings.direction;
         break;
     case PARAMETER_VELOCITY:
+    case PARAMETER_CYCLE:
+        on = (uint8_t)(syntax->parameter - PARAMETER_VELOCITY);
         if (!(number & HAS_DIGIT)) {
+            if (on) {
+                refuse(syntax, STATUS_NUMBER_MISSING);
+            }
             value = settings.cycle_us;
             on = 1;
         } else if (value == 0) {
-            refuse(syntax, STATUS_VELOCITY_ZERO);
+            refuse(syntax, on ? STATUS_PERIOD_TOO_SHORT : STATUS_VELOCITY_ZERO);
         }
         flag = MOTION_CYCLE;
-        command->velocity = value;
-        break;
-    case PARAMETER_CYCLE:
-        if (value == 0) {
-            refuse(syntax, number & HAS_DIGIT ? STATUS_PERIOD_TOO_SHORT : STATUS_NUMBER_MISSING);
-        }
-        flag = MOTION_CYCLE;
-        on = 1;
         command->velocity = value;
         break;
     case PARAMETER_ACCEL:

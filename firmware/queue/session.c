@@ -8,11 +8,11 @@ void session_init(void)
 {
     session.velocity = settings.cycle_us;
     session.flags = MOTION_CYCLE;
-    session_set_linear(settings.ramp != 0);
+    session_set_linear(settings.ramp);
     session_set_pulses(settings.full_step == 0);
 }
 
-static void set_flag(uint8_t flag, bool on)
+static void set_flag(uint8_t flag, uint8_t on)
 {
     session.flags |= flag;
     if (!on) {
@@ -20,7 +20,7 @@ static void set_flag(uint8_t flag, bool on)
     }
 }
 
-NOINLINE void session_set_linear(bool linear)
+NOINLINE void session_set_linear(uint8_t linear)
 {
     set_flag(MOTION_LINEAR, linear);
     session.accel = settings.accel[linear];
