@@ -21,7 +21,7 @@ typedef status_t (*handler_t)(const char *rest);
 typedef struct {
     uint8_t first;
     uint8_t second; /* letter 0: one is enough */
-    handler_t handler;
+    const void *action; /* a handler_t, or a display_t: no function stands at so low an address */
 } command_row_t;
 
 static bool debugging;
@@ -51,36 +51,6 @@ static status_t command_read_ahead(const char *rest)
         motion_syntax_keep(&ahead, &session);
     }
     return status;
-}
-
-static status_t command_show_velocity(const char *rest)
-{
-    (void)rest;
-    return display_request(DISPLAY_VELOCITY);
-}
-
-static status_t command_show_queue(const char *rest)
-{
-    (void)rest;
-    return display_request(DISPLAY_QUEUE);
-}
-
-static status_t command_show_defaults(const char *rest)
-{
-    (void)rest;
-    return display_request(DISPLAY_DEFAULTS);
-}
-
-static status_t command_show_position(const char *rest)
-{
-    (void)rest;
-    return display_request(DISPLAY_POSITION);
-}
-
-static status_t command_help(const char *rest)
-{
-    (void)rest;
-    return display_request(DISPLAY_HELP);
 }
 
 static status_t command_pulse_cw(const char *rest)
@@ -190,13 +160,13 @@ static status_t command_later(const char *rest)
 /* -- the table -------------------------------------------------------------------------------------------------------- */
 
 static const command_row_t rows[] FLASH = {
-#define COMMAND(name, first, second, case_rule, argument, handler, help) \
-    {(first) | CASE_##case_rule, (second) | ARGUMENT_##argument, handler},
+#define COMMAND(name, first, second, case_rule, argument, action, help) \
+    {(first) | CASE_##case_rule, (second) | ARGUMENT_##argument, (const void *)(action)},
 #include "cli/commands.def"
 #undef COMMAND
 };
 enum {
-#define COMMAND(name, first, second, case_rule, argument, handler, help) ROW_##name,
+#define COMMAND(name, first, second, case_rule, argument, action, help) ROW_##name,
 #include "cli/commands.def"
 #undef COMMAND
     ROWS
@@ -205,7 +175,7 @@ enum {
 const char commands_help[] FLASH =
 #define HELP(form, words) form "\t" words "\r\n"
 #define UNLISTED ""
-#define COMMAND(name, first, second, case_rule, argument, handler, help) help
+#define COMMAND(name, first, second, case_rule, argument, action, help) help
 #include "cli/commands.def"
 #undef COMMAND
     ;
@@ -229,7 +199,11 @@ static status_t dispatch(const char *line)
         }
         status = STATUS_SYNTAX;
         if (second >= ARGUMENT_REST || !more(*rest)) {
-            return ((handler_t)flash_pointer(&row->handler))(rest);
+            const void *action = flash_pointer(&row->action);
+            if ((uintptr_t)action < DISPLAYS) {
+                return display_request((display_t)(uintptr_t)action);
+            }
+            return ((handler_t)action)(rest);
         }
     }
     return status;
