@@ -58,11 +58,20 @@ static void put_error(void)
     text_new_line();
 }
 
-static void put_time(const char *before, uint32_t us)
+static void put_times(struct terminal *t)
 {
-    text_put_flash(before);
+    const char *words = FLASH_TEXT(", loaded ");
+    uint32_t us = t->loaded_us;
+    if (--t->owes_times != 0) {
+        words = FLASH_TEXT("received ");
+        us = t->received_us;
+    }
+    text_put_flash(words);
     text_put_u32(us);
     text_put_flash(FLASH_TEXT(" us"));
+    if (t->owes_times == 0) {
+        text_new_line();
+    }
 }
 
 /* Sends the next piece of what is owed, if it fits: the end of the echoed line, displays, times, error, prompt. */
@@ -77,13 +86,8 @@ static NOINLINE bool pay(void)
         text_new_line();
     } else if (display_poll()) {
         /* a piece of it */
-    } else if (t->owes_times == 2) {
-        t->owes_times = 1;
-        put_time(FLASH_TEXT("received "), t->received_us);
-    } else if (t->owes_times == 1) {
-        t->owes_times = 0;
-        put_time(FLASH_TEXT(", loaded "), t->loaded_us);
-        text_new_line();
+    } else if (t->owes_times != 0) {
+        put_times(t);
     } else if (t->owed_status != STATUS_OK) {
         put_error();
         t->owed_status = STATUS_OK;
