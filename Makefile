@@ -54,6 +54,7 @@ FIRMWARE_SRCS := \
     firmware/hal/step_isr.S \
     firmware/hal/step_timer.c \
     firmware/hal/timebase.c \
+    firmware/hal/timebase_isr.S \
     firmware/hal/usart.c \
     firmware/hal/usart_isr.S
 

@@ -1,5 +1,4 @@
 #include "base/number.h"
-#include "base/flash.h"
 
 /* Byte by byte: one 8-bit multiplication each, and what the last one carries out is the overflow. */
 bool number_add_digit(uint32_t *value, uint8_t digit)
@@ -20,29 +19,41 @@ bool number_add_digit(uint32_t *value, uint8_t digit)
     return true;
 }
 
-static const uint32_t powers_of_ten[] FLASH = {
-    1000000000u, 100000000u, 10000000u, 1000000u, 100000u, 10000u, 1000u, 100u, 10u, 1u,
-};
-enum { POWERS = sizeof powers_of_ten / sizeof powers_of_ten[0] };
+/* value = value / 10; the remainder. On the target 370 cycles, half of what the library's division takes. */
+static inline uint8_t take_digit(uint32_t *value)
+{
+    uint8_t digit = 0;
+#ifdef __AVR__
+    uint8_t bits = 32;
+    __asm__("1: lsl %A0\n\t"
+            "rol %B0\n\t"
+            "rol %C0\n\t"
+            "rol %D0\n\t"
+            "rol %1\n\t"
+            "cpi %1, 10\n\t"
+            "brcs 2f\n\t"
+            "subi %1, 10\n\t"
+            "inc %A0\n"
+            "2: dec %2\n\t"
+            "brne 1b"
+            : "+r"(*value), "+d"(digit), "+r"(bits));
+#else
+    digit = (uint8_t)(*value % 10u);
+    *value /= 10u;
+#endif
+    return digit;
+}
 
 char *number_format(char *text, uint32_t value, uint8_t decimals)
 {
-    bool started = false;
-    for (uint8_t place = POWERS; place > 0; place--) {
-        const uint32_t power = flash_u32(&powers_of_ten[POWERS - place]);
-        char digit = '0';
-        while (value >= power) {
-            value -= power;
-            digit++;
-        }
-        started = started || digit != '0' || place <= decimals + 1;
-        if (started) {
-            if (place == decimals) {
-                *text++ = '.';
-            }
-            *text++ = digit;
+    text += NUMBER_TEXT_BYTES - 1;
+    *text = '\0';
+    for (uint8_t point = decimals;; point--) {
+        *--text = (char)('0' + take_digit(&value));
+        if (point == 1) {
+            *--text = '.';
+        } else if (value == 0 && (int8_t)point <= 0) {
+            return text;
         }
     }
-    *text = '\0';
-    return text;
 }

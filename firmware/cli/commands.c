@@ -1,6 +1,7 @@
 #include "cli/commands.h"
 #include "base/flash.h"
 #include "base/inline.h"
+#include "base/zeroed.h"
 #include "cli/display.h"
 #include "cli/motion_syntax.h"
 #include "cli/timebase_port.h"
@@ -20,20 +21,19 @@ typedef status_t (*handler_t)(const char *rest);
 typedef struct {
     uint8_t first;
     uint8_t second; /* letter 0: one is enough */
-    handler_t handler;
+    const void *action; /* a handler_t, or a display_t: no function stands at so low an address */
 } command_row_t;
 
 static bool debugging;
-static const char *refused_range; /* for STATUS_RANGE */
 
 /* The motion command, or single value, being read ahead: how many characters of the line it has seen, 0 for none. */
 static motion_syntax_t ahead;
 static uint8_t characters_ahead;
 
-/* The end of the command: of the line, or a space. */
-static bool is_end(char c)
+/* 0 at the end of the command: of the line, or a space. */
+static uint8_t more(char c)
 {
-    return c == '\0' || c == ' ';
+    return (uint8_t)(c & ~' ');
 }
 
 /* -- handlers: rest is what follows the command's letters, up to the space or the end of the line --------------------- */
@@ -49,40 +49,8 @@ static status_t command_read_ahead(const char *rest)
     }
     if (status == STATUS_OK) {
         motion_syntax_keep(&ahead, &session);
-    } else {
-        refused_range = ahead.range;
     }
     return status;
-}
-
-static status_t command_show_velocity(const char *rest)
-{
-    (void)rest;
-    return display_request(DISPLAY_VELOCITY);
-}
-
-static status_t command_show_queue(const char *rest)
-{
-    (void)rest;
-    return display_request(DISPLAY_QUEUE);
-}
-
-static status_t command_show_defaults(const char *rest)
-{
-    (void)rest;
-    return display_request(DISPLAY_DEFAULTS);
-}
-
-static status_t command_show_position(const char *rest)
-{
-    (void)rest;
-    return display_request(DISPLAY_POSITION);
-}
-
-static status_t command_help(const char *rest)
-{
-    (void)rest;
-    return display_request(DISPLAY_HELP);
 }
 
 static status_t command_pulse_cw(const char *rest)
@@ -148,18 +116,17 @@ static status_t command_debug(const char *rest)
 
 static status_t command_ramp(const char *rest)
 {
-    static const char range_flag[] FLASH = "0..1";
-    if (is_end(rest[0])) {
+    if (!more(rest[0])) {
         return STATUS_OK; /* neither 0 nor 1: no change (A-SYS-02) */
     }
     if (rest[0] < '0' || rest[0] > '9') {
         return STATUS_SYNTAX;
     }
-    if (rest[0] > '1' || !is_end(rest[1])) {
-        refused_range = range_flag;
+    if (rest[0] > '1' || more(rest[1])) {
+        ahead.range = motion_syntax_range_flag;
         return STATUS_RANGE;
     }
-    session_set_linear(rest[0] == '1');
+    session_set_linear((uint8_t)(rest[0] - '0'));
     return STATUS_OK;
 }
 
@@ -193,13 +160,13 @@ static status_t command_later(const char *rest)
 /* -- the table -------------------------------------------------------------------------------------------------------- */
 
 static const command_row_t rows[] FLASH = {
-#define COMMAND(name, first, second, case_rule, argument, handler, help) \
-    {(first) | CASE_##case_rule, (second) | ARGUMENT_##argument, handler},
+#define COMMAND(name, first, second, case_rule, argument, action, help) \
+    {(first) | CASE_##case_rule, (second) | ARGUMENT_##argument, (const void *)(action)},
 #include "cli/commands.def"
 #undef COMMAND
 };
 enum {
-#define COMMAND(name, first, second, case_rule, argument, handler, help) ROW_##name,
+#define COMMAND(name, first, second, case_rule, argument, action, help) ROW_##name,
 #include "cli/commands.def"
 #undef COMMAND
     ROWS
@@ -208,48 +175,35 @@ enum {
 const char commands_help[] FLASH =
 #define HELP(form, words) form "\t" words "\r\n"
 #define UNLISTED ""
-#define COMMAND(name, first, second, case_rule, argument, handler, help) help
+#define COMMAND(name, first, second, case_rule, argument, action, help) help
 #include "cli/commands.def"
 #undef COMMAND
     ;
 
-static uint8_t lower(uint8_t c)
-{
-    return c >= 'A' && c <= 'Z' ? c | 0x20u : c;
-}
-
 static status_t dispatch(const char *line)
 {
-    const uint8_t exact = (uint8_t)line[0] | CASE_EXACT;
-    const uint8_t any = lower((uint8_t)line[0]);
+    const uint8_t typed = (uint8_t)line[0];
     status_t status = STATUS_UNKNOWN_COMMAND;
-    if ((uint8_t)line[0] > LETTER) {
-        return status;
-    }
-    const command_row_t *row = rows;
-    const command_row_t *end = rows + ROW_RAMP;
-    if (any == '$') {
-        row = end;
-        end = rows + ROWS;
-    }
-    for (; row < end; row++) {
+    for (const command_row_t *row = rows; row < rows + ROWS; row++) {
         const uint8_t first = flash_u8(&row->first);
-        if (first != any && first != exact) {
-            continue; /* most rows: nothing more is read of them */
+        const uint8_t differ = first & CASE_EXACT ? UINT8_MAX : (uint8_t)~0x20; /* bits in which no letter may differ */
+        if ((typed ^ (first & LETTER)) & differ) {
+            continue;
         }
         const char *rest = line + 1;
         const uint8_t second = flash_u8(&row->second);
-        if ((second & LETTER) != 0) {
-            const uint8_t typed = (uint8_t)*rest++;
-            if ((second & LETTER) != (first == any ? lower(typed) : typed)) {
+        if (second & LETTER) {
+            if (((uint8_t)*rest++ ^ (second & LETTER)) & differ) {
                 continue;
             }
         }
         status = STATUS_SYNTAX;
-        if (second >= ARGUMENT_REST || is_end(*rest)) {
-            handler_t handler;
-            FLASH_COPY(&handler, &row->handler, sizeof handler);
-            return handler(rest);
+        if (second >= ARGUMENT_REST || !more(*rest)) {
+            const void *action = flash_pointer(&row->action);
+            if ((uintptr_t)action < DISPLAYS) {
+                return display_request((display_t)(uintptr_t)action);
+            }
+            return ((handler_t)action)(rest);
         }
     }
     return status;
@@ -258,15 +212,8 @@ static status_t dispatch(const char *line)
 void commands_init(void)
 {
     session_init();
-    debugging = false;
-    characters_ahead = 0;
-}
-
-/* The commands that are read by the rules of motion_syntax.h. */
-static bool is_read_ahead(char first)
-{
-    const uint8_t letter = lower((uint8_t)first);
-    return letter == 'm' || letter == 'v' || letter == 'a' || letter == 'd';
+    AT_BOOT_ZERO(debugging);
+    AT_BOOT_ZERO(characters_ahead);
 }
 
 void commands_read_ahead(const char *line, uint8_t length)
@@ -274,8 +221,9 @@ void commands_read_ahead(const char *line, uint8_t length)
     uint8_t i = characters_ahead;
     if (i == 0 || i > length) {
         characters_ahead = 0;
-        if (length == 0 || !is_read_ahead(line[0])) {
-            return;
+        const uint8_t letter = (uint8_t)line[0] | 0x20u;
+        if (length == 0 || (letter != 'm' && letter != 'v' && letter != 'a' && letter != 'd')) {
+            return; /* not read by the rules of motion_syntax.h */
         }
         motion_syntax_begin(&ahead, line[0], &session);
         i = 1;
@@ -289,10 +237,10 @@ void commands_read_ahead(const char *line, uint8_t length)
 /* By the table. */
 static NOINLINE status_t execute_by_table(const char *line)
 {
-    if (line[0] >= '0' && line[0] <= '9') {
+    if ((uint8_t)(line[0] - '0') <= 9) {
         return STATUS_NOT_YET; /* a network address: TRM-006 */
     }
-    if (is_end(line[0])) {
+    if (!more(line[0])) {
         return STATUS_OK;
     }
     if (line[0] == '$') {
@@ -304,24 +252,27 @@ static NOINLINE status_t execute_by_table(const char *line)
 status_t commands_execute(const char *line, uint8_t length)
 {
     commands_read_ahead(line, length);
-    const bool complete = characters_ahead != 0 && ahead.status == STATUS_OK;
+    const uint8_t characters = characters_ahead;
     characters_ahead = 0;
     /* What was read ahead without an error needs no search: time counts. (vd is an error there.) */
-    return complete ? command_read_ahead(line) : execute_by_table(line);
+    if (characters != 0 && ahead.status == STATUS_OK) {
+        return command_read_ahead(line);
+    }
+    return execute_by_table(line);
 }
 
 const char *commands_refused_range(void)
 {
-    return refused_range;
+    return ahead.range;
 }
 
 bool commands_at_once(char character)
 {
-    const bool pulse = character == '+' || character == '-';
-    if (pulse) {
-        engine_single_pulse(character == '-');
+    if (character != '+' && character != '-') {
+        return false;
     }
-    return pulse;
+    engine_single_pulse(character == '-');
+    return true;
 }
 
 bool commands_debugging(void)

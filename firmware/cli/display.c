@@ -1,5 +1,7 @@
 #include "cli/display.h"
 #include "base/flash.h"
+#include "base/inline.h"
+#include "base/zeroed.h"
 #include "cli/commands.h"
 #include "cli/terminal_port.h"
 #include "cli/text.h"
@@ -7,16 +9,16 @@
 #include "queue/queue.h"
 #include "queue/session.h"
 
-static uint8_t waiting[DISPLAY_WAITING]; /* display_t, the first one is next */
-static uint8_t waiting_count;
-static uint8_t current; /* display_t */
+static struct {
+    const char *text;      /* in flash: what is still to come of the present text; 0: nothing is printed */
+    uint8_t ruled;         /* how many signs of a rule have been printed */
+    uint8_t row;           /* of the queue; then what follows its rows */
+    uint8_t current;       /* display_t */
+    uint8_t waiting_count; /* how many wait behind it */
+    uint8_t waiting[DISPLAY_WAITING];
+    session_t session; /* what `cf` shows: as it was when the display began, and whether GAP testing was on */
+} shown;
 
-static const char *text; /* in flash: what is still to come of the present text; 0: nothing is printed */
-static uint8_t ruled;    /* how many signs of a rule have been printed */
-static uint8_t row;      /* of the queue; then what follows its rows */
-
-/* What `cf` shows: as it was when the display began, and whether GAP testing was on. */
-static session_t shown_session;
 #define SHOWN_GAP (1u << 5)
 _Static_assert((SHOWN_GAP & SESSION_FLAGS) == 0, "a flag of its own");
 
@@ -104,16 +106,6 @@ static const char state_words[][8] FLASH = {"STANDBY", "ACCEL", "CRUISE", "DECEL
 
 /* -- printing --------------------------------------------------------------------------------------------------------- */
 
-/* The command whose values are shown. */
-static void shown_command(motion_command_t *command)
-{
-    if (current == DISPLAY_QUEUE && row < QUEUE_POSITIONS) {
-        *command = *queue_entry(row);
-    } else {
-        session_template(&shown_session, command);
-    }
-}
-
 static void put_accel(accel_code_t code)
 {
     if (code < ACCEL_CODE_WHOLE) {
@@ -124,7 +116,7 @@ static void put_accel(accel_code_t code)
 }
 
 /* At most 21 characters. */
-static void print_field(uint8_t field, const motion_command_t *command)
+static NOINLINE void print_field(uint8_t field, const motion_command_t *command)
 {
     uint32_t number, second;
     switch (field) {
@@ -135,7 +127,7 @@ static void print_field(uint8_t field, const motion_command_t *command)
     case FIELD_DECEL: put_accel(command->decel); return;
     case FIELD_EXTRA: number = command->extra_pulses; break;
     case FIELD_WAIT: number = command->start_wait_us; break;
-    case FIELD_ROW: number = row; break;
+    case FIELD_ROW: number = shown.row; break;
     case FIELD_NEXT: number = queue_next_position(); break;
     case FIELD_EXECUTING: number = queue_executing_position(); break;
     case FIELD_VELOCITY:
@@ -159,21 +151,21 @@ static void print_field(uint8_t field, const motion_command_t *command)
 
 static void begin(uint8_t display)
 {
-    current = display;
-    text = flash_pointer(&texts[display]);
-    row = commands_debugging() ? UINT8_MAX : 0; /* position 0 is shown in debug mode only */
-    shown_session = session;
+    shown.current = display;
+    shown.text = flash_pointer(&texts[display]);
+    shown.row = commands_debugging() ? UINT8_MAX : 0; /* position 0 is shown in debug mode only */
+    shown.session = session;
     if (engine_gap()) {
-        shown_session.flags |= SHOWN_GAP;
+        shown.session.flags |= SHOWN_GAP;
     }
 }
 
 /* The text is through: what follows it. */
 static void next_text(void)
 {
-    text = 0;
-    if (current == DISPLAY_QUEUE) {
-        row++;
+    const char *text = 0;
+    if (shown.current == DISPLAY_QUEUE) {
+        const uint8_t row = ++shown.row;
         if (row <= QUEUE_LAST) {
             text = queue_row_text;
         } else if (row == QUEUE_LAST + 1) {
@@ -182,26 +174,33 @@ static void next_text(void)
             text = queue_executing_text;
         }
     }
-    if (text == 0 && waiting_count > 0) {
-        begin(waiting[0]);
-        waiting_count--;
-        for (uint8_t i = 0; i < waiting_count; i++) {
-            waiting[i] = waiting[i + 1];
+    shown.text = text;
+    if (text == 0 && shown.waiting_count > 0) {
+        begin(shown.waiting[0]);
+        shown.waiting_count--;
+        for (uint8_t i = 0; i < DISPLAY_WAITING - 1; i++) {
+            shown.waiting[i] = shown.waiting[i + 1];
         }
     }
 }
 
-static void skip_behind(uint8_t mark)
+static NOINLINE const char *behind(const char *text, uint8_t mark)
 {
     while (flash_u8(text++) != mark) {
     }
+    return text;
 }
 
 /* Some characters, or a field. */
-static void print_piece(void)
+static NOINLINE void print_piece(void)
 {
-    motion_command_t command;
-    shown_command(&command);
+    motion_command_t defaults; /* or a row of the queue: the command whose values are shown */
+    const motion_command_t *command = &defaults;
+    session_template(&shown.session, &defaults);
+    if (shown.current == DISPLAY_QUEUE && shown.row < QUEUE_POSITIONS) {
+        command = queue_entry(shown.row);
+    }
+    const char *text = shown.text;
     for (uint8_t room = TEXT_PIECE_BYTES; room > 0; room--) {
         const uint8_t character = flash_u8(text);
         if (character == '\0') {
@@ -210,57 +209,57 @@ static void print_piece(void)
         }
         if (character >= FIELD_COUNT && character < CHOICE_ELSE) {
             if (room == TEXT_PIECE_BYTES) {
-                text++;
-                print_field(character, &command);
+                shown.text = text + 1;
+                print_field(character, command);
+                return;
             }
-            return;
+            break;
         }
-        if (character != '=' || ++ruled == RULE_CHARACTERS) {
-            ruled = 0;
+        if (character != '=' || ++shown.ruled == RULE_CHARACTERS) {
+            shown.ruled = 0;
             text++;
         }
         if (character == CHOICE_ELSE) {
-            skip_behind(CHOICE_END);
+            text = behind(text, CHOICE_END);
         } else if (character >= CHOICE_BEGIN) {
-            if (!(command.flags & character & ~CHOICE_BEGIN)) {
-                skip_behind(CHOICE_ELSE);
+            if (!(command->flags & character & ~CHOICE_BEGIN)) {
+                text = behind(text, CHOICE_ELSE);
             }
         } else if (character != CHOICE_END) {
             terminal_port_put(character);
         }
     }
+    shown.text = text;
 }
 
 /* -- from outside ----------------------------------------------------------------------------------------------------- */
 
 void display_init(void)
 {
-    waiting_count = 0;
-    ruled = 0;
-    text = 0;
+    AT_BOOT_ZERO(shown);
 }
 
 status_t display_request(display_t display)
 {
-    if (!display_active()) {
+    if (shown.text == 0) {
         begin(display);
         return STATUS_OK;
     }
-    if (waiting_count == DISPLAY_WAITING) {
+    if (shown.waiting_count == DISPLAY_WAITING) {
         return STATUS_BUSY;
     }
-    waiting[waiting_count++] = display;
+    shown.waiting[shown.waiting_count++] = display;
     return STATUS_OK;
 }
 
 bool display_active(void)
 {
-    return text != 0;
+    return shown.text != 0;
 }
 
 bool display_poll(void)
 {
-    if (!display_active() || terminal_port_free() < TEXT_PIECE_BYTES) {
+    if (shown.text == 0 || terminal_port_free() < TEXT_PIECE_BYTES) {
         return false;
     }
     print_piece();

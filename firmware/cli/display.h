@@ -20,6 +20,7 @@ typedef enum {
     DISPLAY_VELOCITY, /* vd */
     DISPLAY_POSITION, /* p */
     DISPLAY_HELP,     /* ? */
+    DISPLAYS
 } display_t;
 
 #define DISPLAY_WAITING 4

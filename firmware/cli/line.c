@@ -1,8 +1,9 @@
 #include "cli/line.h"
+#include "base/inline.h"
 
 enum { BACKSPACE = 0x08, LINE_FEED = 0x0A, CARRIAGE_RETURN = 0x0D, ESCAPE = 0x1B, SPACE = 0x20, DELETE = 0x7F };
 
-void line_reset(line_t *line)
+NOINLINE void line_reset(line_t *line)
 {
     line->length = 0;
     line->text[0] = '\0';
@@ -17,27 +18,28 @@ static line_event_t append(line_t *line, char character)
         }
         return LINE_UNCHANGED;
     }
-    line->text[line->length++] = character;
-    line->text[line->length] = '\0';
+    char *end = &line->text[line->length++];
+    end[0] = character;
+    end[1] = '\0';
     return LINE_APPENDED;
 }
 
 line_event_t line_take(line_t *line, uint8_t byte)
 {
-    const bool after_return = line->after_return;
-    line->after_return = byte == CARRIAGE_RETURN;
+    const uint8_t last = line->last;
+    line->last = byte;
 
     if (byte >= SPACE && byte != DELETE) {
         return append(line, (char)byte);
     }
-    if (byte == CARRIAGE_RETURN || (byte == LINE_FEED && !after_return)) {
+    if (byte == CARRIAGE_RETURN || (byte == LINE_FEED && last != CARRIAGE_RETURN)) {
         return LINE_ENDED;
     }
     if ((byte == BACKSPACE || byte == DELETE) && line->length > 0) {
         line->text[--line->length] = '\0';
         return LINE_ERASED;
     }
-    if (byte == ESCAPE && !line_is_blank(line)) {
+    if (byte == ESCAPE && line_begun(line)) {
         line_reset(line);
         return LINE_CLEARED;
     }
@@ -46,7 +48,7 @@ line_event_t line_take(line_t *line, uint8_t byte)
 
 line_event_t line_damage(line_t *line)
 {
-    line->after_return = false;
+    line->last = 0;
     line->status = STATUS_LINE_DAMAGED;
     return LINE_UNCHANGED;
 }

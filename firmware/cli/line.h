@@ -18,7 +18,7 @@
 typedef struct {
     uint8_t length;
     status_t status;                /* not STATUS_OK: the line will be refused */
-    bool after_return;              /* a LF now belongs to the CR before it */
+    uint8_t last;                   /* the byte before: a LF behind a CR belongs to it */
     char text[LINE_CHARACTERS + 1]; /* NUL-terminated whenever line_take() has returned */
 } line_t;
 
@@ -35,10 +35,10 @@ void line_reset(line_t *line); /* empty, for the next line */
 line_event_t line_take(line_t *line, uint8_t byte);
 line_event_t line_damage(line_t *line); /* instead of a byte that was lost or damaged */
 
-/* Nothing has been typed on this line, not even something that was lost. */
-static inline bool line_is_blank(const line_t *line)
+/* 0: nothing has been typed on this line, not even something that was lost. */
+static inline uint8_t line_begun(const line_t *line)
 {
-    return line->length == 0 && line->status == STATUS_OK;
+    return (uint8_t)(line->length | line->status);
 }
 
 #endif

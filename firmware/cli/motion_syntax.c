@@ -57,9 +57,15 @@ enum {
     ENDED = 1 << 3, /* a space was met */
 };
 
-static const char range_flag[] FLASH = "0..1";
+const char motion_syntax_range_flag[] FLASH = "0..1";
 static const char range_byte[] FLASH = "0..255";
 static const char range_ramp[] FLASH = "0.01..999";
+
+/* Which of these bits the number being read has. */
+static inline uint8_t has(const motion_syntax_t *syntax, uint8_t bits)
+{
+    return syntax->number & bits;
+}
 
 /* Nothing more is read after an error: the first one stands. */
 static void refuse(motion_syntax_t *syntax, status_t status)
@@ -82,7 +88,7 @@ static void open_parameter(motion_syntax_t *syntax, uint8_t parameter)
 }
 
 /* A ramp value: its code, or 0 for the system default, which resolve_ramp() puts in its place. */
-static NOINLINE void close_ramp(motion_syntax_t *syntax)
+static void close_ramp(motion_syntax_t *syntax)
 {
     const uint32_t value = syntax->value;
     uint8_t places = syntax->places;
@@ -114,12 +120,13 @@ static NOINLINE void close_ramp(motion_syntax_t *syntax)
 /* The number being read is complete. */
 static NOINLINE void close_parameter(motion_syntax_t *syntax)
 {
+    NEAR(syntax);
     motion_command_t *command = &syntax->command;
     const uint8_t number = syntax->number;
     uint32_t value = syntax->value;
     uint8_t flag = 0; /* of the command, that this parameter sets */
-    bool on = false;  /* or clears */
-    if ((number & (HAS_POINT | HAS_DIGIT)) == HAS_POINT) {
+    uint8_t on = 0;   /* or clears, if 0 */
+    if (has(syntax, HAS_POINT | HAS_DIGIT) == HAS_POINT) {
         refuse(syntax, STATUS_NUMBER_MISSING);
         return;
     }
@@ -127,24 +134,21 @@ static NOINLINE void close_parameter(motion_syntax_t *syntax)
     case PARAMETER_COUNT:
         command->count = value;
         flag = MOTION_CCW;
-        on = number & (HAS_DIGIT | HAS_MINUS) ? (number & HAS_MINUS) != 0 : settings.direction != 0;
+        on = has(syntax, HAS_DIGIT | HAS_MINUS) ? number & HAS_MINUS : settings.direction;
         break;
     case PARAMETER_VELOCITY:
-        if (!(number & HAS_DIGIT)) {
-            value = settings.cycle_us;
-            on = true;
-        } else if (value == 0) {
-            refuse(syntax, STATUS_VELOCITY_ZERO);
-        }
-        flag = MOTION_CYCLE;
-        command->velocity = value;
-        break;
     case PARAMETER_CYCLE:
-        if (value == 0) {
-            refuse(syntax, number & HAS_DIGIT ? STATUS_PERIOD_TOO_SHORT : STATUS_NUMBER_MISSING);
+        on = (uint8_t)(syntax->parameter - PARAMETER_VELOCITY);
+        if (!(number & HAS_DIGIT)) {
+            if (on) {
+                refuse(syntax, STATUS_NUMBER_MISSING);
+            }
+            value = settings.cycle_us;
+            on = 1;
+        } else if (value == 0) {
+            refuse(syntax, on ? STATUS_PERIOD_TOO_SHORT : STATUS_VELOCITY_ZERO);
         }
         flag = MOTION_CYCLE;
-        on = true;
         command->velocity = value;
         break;
     case PARAMETER_ACCEL:
@@ -165,16 +169,19 @@ static NOINLINE void close_parameter(motion_syntax_t *syntax)
     case PARAMETER_FULL_STEP: flag = MOTION_PULSES; break;
     case PARAMETER_PULSES:
         flag = MOTION_PULSES;
-        on = true;
+        on = 1;
         break;
     case PARAMETERS: break; /* not a parameter: the number of them */
     }
     if (flag & (MOTION_LINEAR | MOTION_SYNC)) { /* 0 or 1, 1 without a number */
         if (value > 1) {
-            refuse_range(syntax, range_flag);
+            refuse_range(syntax, motion_syntax_range_flag);
             return;
         }
-        on = value != 0 || !(number & HAS_DIGIT);
+        on = (uint8_t)value;
+        if (!(number & HAS_DIGIT)) {
+            on = 1;
+        }
     }
     command->flags |= flag;
     if (!on) {
@@ -215,7 +222,7 @@ static void take_point(motion_syntax_t *syntax)
 
 static void take_minus(motion_syntax_t *syntax)
 {
-    if (syntax->parameter != PARAMETER_COUNT || (syntax->number & HAS_ANY)) {
+    if (syntax->parameter != PARAMETER_COUNT || has(syntax, HAS_ANY)) {
         refuse(syntax, STATUS_SYNTAX);
         return;
     }
@@ -231,7 +238,7 @@ static void take_letter(motion_syntax_t *syntax, uint8_t letter)
     }
     if (parameter == PARAMETER_CYCLE) {
         /* c only says how the number of v is meant. */
-        if (syntax->parameter != PARAMETER_VELOCITY || (syntax->number & HAS_ANY)) {
+        if (syntax->parameter != PARAMETER_VELOCITY || has(syntax, HAS_ANY)) {
             refuse(syntax, STATUS_SYNTAX);
             return;
         }
@@ -251,10 +258,9 @@ void motion_syntax_begin(motion_syntax_t *syntax, char first_letter, const sessi
 {
     session_template(defaults, &syntax->command);
     syntax->status = STATUS_OK;
-    syntax->range = 0;
     syntax->given = 0;
     open_parameter(syntax, flash_u8(&parameter_by_letter[(first_letter | 0x20) - 'a']));
-    syntax->single = syntax->parameter != PARAMETER_COUNT;
+    syntax->single = syntax->parameter; /* the count's number is 0 */
 }
 
 static void take_other(motion_syntax_t *syntax, uint8_t c)
@@ -272,6 +278,7 @@ static void take_other(motion_syntax_t *syntax, uint8_t c)
 
 void motion_syntax_take(motion_syntax_t *syntax, char character)
 {
+    NEAR(syntax);
     if (syntax->status != STATUS_OK || (syntax->given & ENDED)) {
         return;
     }
@@ -282,7 +289,7 @@ void motion_syntax_take(motion_syntax_t *syntax, char character)
     }
     const uint8_t before = syntax->number;
     syntax->number = (uint8_t)(before | (digit != 0 ? HAS_DIGIT | NOT_ZERO : HAS_DIGIT));
-    if (before & (NO_NUMBER | HAS_POINT)) {
+    if ((uint8_t)(before & (NO_NUMBER | HAS_POINT))) {
         take_special_digit(syntax, digit);
     } else if (!number_add_digit(&syntax->value, digit)) {
         syntax->status = STATUS_NUMBER_TOO_LARGE;
@@ -305,6 +312,7 @@ static void resolve_ramp(motion_syntax_t *syntax)
 
 status_t motion_syntax_end(motion_syntax_t *syntax)
 {
+    NEAR(syntax);
     motion_command_t *command = &syntax->command;
     if (syntax->status == STATUS_OK) {
         close_parameter(syntax);
@@ -314,17 +322,19 @@ status_t motion_syntax_end(motion_syntax_t *syntax)
     }
     resolve_ramp(syntax);
     if (syntax->single) {
+        if (syntax->parameter >= PARAMETER_ACCEL) {
+            return STATUS_OK; /* a or d */
+        }
         command->count = 1; /* the engine checks commands: is this velocity possible at all? */
     } else if (command->count == 0) {
         return STATUS_NOT_YET; /* continuous motion */
     }
-    const bool ramp_alone =
-        syntax->single && (syntax->parameter == PARAMETER_ACCEL || syntax->parameter == PARAMETER_DECEL);
-    return ramp_alone ? STATUS_OK : engine_check(command);
+    return engine_check(command);
 }
 
 void motion_syntax_keep(const motion_syntax_t *syntax, session_t *defaults)
 {
+    NEAR(syntax);
     defaults->velocity = syntax->command.velocity;
     defaults->accel = syntax->command.accel;
     defaults->decel = syntax->command.decel;

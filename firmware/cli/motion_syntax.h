@@ -32,8 +32,11 @@ typedef struct {
     uint8_t number;           /* bits: what the number being read consists of */
     uint8_t places;           /* decimals taken into value */
     uint8_t given;            /* bits: parameters that need a decision at the end */
-    bool single;              /* v, a or d alone: no second parameter may follow */
+    uint8_t single;           /* not 0: v, a or d alone, no second parameter may follow */
 } motion_syntax_t;
+
+/* The range of what is either 0 or 1, in flash. */
+extern const char motion_syntax_range_flag[];
 
 /* Starts on the first letter: m, or v, a, d for the single commands. */
 void motion_syntax_begin(motion_syntax_t *syntax, char first_letter, const session_t *defaults);

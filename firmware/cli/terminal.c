@@ -1,6 +1,7 @@
 #include "cli/terminal.h"
 #include "base/flash.h"
 #include "base/inline.h"
+#include "base/zeroed.h"
 #include "cli/commands.h"
 #include "cli/display.h"
 #include "cli/line.h"
@@ -19,65 +20,80 @@ static const char version_line[] FLASH = "SAC " VERSION_NUMBER " " VERSION_DATE 
 static const char prompt[] FLASH = "SAC>";
 
 static line_t line;
-static uint8_t echoed; /* how many characters of the line stand on the screen */
 
-/* What is owed while answers are held back. */
-static bool behind;            /* a prompt is owed; no echo until it is printed */
-static bool owes_new_line;     /* the cursor stands behind the last line that was echoed */
-static status_t owed_status;   /* the first error since, or STATUS_OK */
-static const char *owed_range; /* of that error */
+static struct terminal {
+    uint8_t echoed; /* how many characters of the line stand on the screen */
 
-/* Debug mode: how long the last line took. */
-static uint8_t owes_times;   /* pieces of the report */
-static bool timing;          /* this line is being timed: not while the times of the last one are owed */
-static uint32_t received_us; /* while a line is typed: when it began */
-static uint32_t loaded_us;
+    /* What is owed while answers are held back. */
+    bool behind;            /* a prompt is owed; no echo until it is printed */
+    bool owes_new_line;     /* the cursor stands behind the last line that was echoed */
+    status_t owed_status;   /* the first error since, or STATUS_OK */
+    const char *owed_range; /* of that error */
+
+    /* Debug mode: how long the last line took. The clock starts with the line, and again at its end. */
+    uint8_t owes_times; /* pieces of the report */
+    bool timing;        /* this line is being timed: not while the times of the last one are owed */
+    uint32_t received_us;
+    uint32_t loaded_us;
+} terminal;
+
+static inline struct terminal *self(void)
+{
+    struct terminal *t = &terminal;
+    NEAR(t);
+    return t;
+}
 
 /* Each at most TEXT_PIECE_BYTES long. */
 static void put_error(void)
 {
     terminal_port_put('?');
-    text_put_u32(owed_status);
+    text_put_u32(terminal.owed_status);
     terminal_port_put(' ');
-    text_put_flash(status_words(owed_status));
-    if (owed_status == STATUS_RANGE) {
+    text_put_flash(status_words(terminal.owed_status));
+    if (terminal.owed_status == STATUS_RANGE) {
         terminal_port_put(' ');
-        text_put_flash(owed_range);
+        text_put_flash(terminal.owed_range);
     }
     text_new_line();
 }
 
-static void put_time(const char *before, uint32_t us)
+static void put_times(struct terminal *t)
 {
-    text_put_flash(before);
+    const char *words = FLASH_TEXT(", loaded ");
+    uint32_t us = t->loaded_us;
+    if (--t->owes_times != 0) {
+        words = FLASH_TEXT("received ");
+        us = t->received_us;
+    }
+    text_put_flash(words);
     text_put_u32(us);
     text_put_flash(FLASH_TEXT(" us"));
+    if (t->owes_times == 0) {
+        text_new_line();
+    }
 }
 
 /* Sends the next piece of what is owed, if it fits: the end of the echoed line, displays, times, error, prompt. */
 static NOINLINE bool pay(void)
 {
+    struct terminal *const t = self();
     if (terminal_port_free() < TEXT_PIECE_BYTES) {
         return false;
     }
-    if (owes_new_line) {
-        owes_new_line = false;
+    if (t->owes_new_line) {
+        t->owes_new_line = false;
         text_new_line();
     } else if (display_poll()) {
         /* a piece of it */
-    } else if (owes_times == 2) {
-        owes_times = 1;
-        put_time(FLASH_TEXT("received "), received_us);
-    } else if (owes_times == 1) {
-        owes_times = 0;
-        put_time(FLASH_TEXT(", loaded "), loaded_us);
-        text_new_line();
-    } else if (owed_status != STATUS_OK) {
+    } else if (t->owes_times != 0) {
+        put_times(t);
+    } else if (t->owed_status != STATUS_OK) {
         put_error();
-        owed_status = STATUS_OK;
+        t->owed_status = STATUS_OK;
     } else {
         text_put_flash(prompt);
-        behind = false;
+        t->behind = false;
     }
     return true;
 }
@@ -85,15 +101,16 @@ static NOINLINE bool pay(void)
 /* The answer to a line. */
 static void owe(status_t status)
 {
-    if (!behind) {
-        behind = true;
-        owes_new_line = true;
+    struct terminal *const t = self();
+    if (!t->behind) {
+        t->behind = true;
+        t->owes_new_line = true;
     }
-    if (owed_status == STATUS_OK) {
-        owed_status = status;
-        owed_range = commands_refused_range();
+    if (t->owed_status == STATUS_OK) {
+        t->owed_status = status;
+        t->owed_range = commands_refused_range();
     }
-    echoed = 0;
+    t->echoed = 0;
 }
 
 /* Brings the screen to what the line is, as far as the port has room. */
@@ -101,8 +118,8 @@ static NOINLINE bool echo(void)
 {
     bool worked = false;
     uint8_t room = terminal_port_free();
-    while (echoed < line.length && room > 0) {
-        terminal_port_put((uint8_t)line.text[echoed++]);
+    while (terminal.echoed < line.length && room > 0) {
+        terminal_port_put((uint8_t)line.text[terminal.echoed++]);
         room--;
         worked = true;
     }
@@ -112,7 +129,7 @@ static NOINLINE bool echo(void)
 /* A character was taken back: from the screen too, or the line is shown anew when there is room. */
 static NOINLINE void erase(void)
 {
-    if (echoed <= line.length) {
+    if (terminal.echoed <= line.length) {
         return; /* it had not been echoed */
     }
     if (terminal_port_free() < 3) {
@@ -120,27 +137,16 @@ static NOINLINE void erase(void)
         return;
     }
     text_put_flash(FLASH_TEXT("\b \b"));
-    echoed--;
-}
-
-/* Debug mode: the line has been received, or executed. */
-static NOINLINE void note_received(void)
-{
-    loaded_us = timebase_us();
-    received_us = loaded_us - received_us;
-}
-
-static NOINLINE void note_loaded(void)
-{
-    loaded_us = timebase_us() - loaded_us;
-    owes_times = 2;
+    terminal.echoed--;
 }
 
 static NOINLINE void end_line(void)
 {
-    const bool timed = timing && !line_is_blank(&line);
+    struct terminal *const t = self();
+    const uint8_t timed = line_begun(&line) ? t->timing : 0;
     if (timed) {
-        note_received();
+        t->received_us = timebase_us();
+        timebase_start();
     }
     status_t status = line.status;
     if (status == STATUS_OK) {
@@ -149,34 +155,31 @@ static NOINLINE void end_line(void)
         commands_read_ahead(line.text, 0);
     }
     if (timed && commands_debugging()) {
-        note_loaded();
+        t->loaded_us = timebase_us();
+        t->owes_times = 2;
     }
     line_reset(&line);
     owe(status);
 }
 
 /* The first character of a line: it may act at once, and the clock of the debug mode starts. */
-static NOINLINE bool begin_line(uint8_t byte)
+static bool begin_line(uint8_t byte)
 {
     if (commands_at_once((char)byte)) {
         return false;
     }
-    timing = commands_debugging() && owes_times == 0;
-    if (timing) {
-        received_us = timebase_us();
+    terminal.timing = false;
+    if (commands_debugging() && terminal.owes_times == 0) {
+        terminal.timing = true;
+        timebase_start();
     }
     return true;
 }
 
 void terminal_init(void)
 {
-    line_reset(&line);
-    echoed = 0;
-    behind = false;
-    owes_new_line = false;
-    owes_times = 0;
-    timing = false;
-    owed_status = STATUS_OK;
+    AT_BOOT_ZERO(line);
+    AT_BOOT_ZERO(terminal);
     display_init();
     text_put_flash(version_line);
     text_put_flash(prompt);
@@ -192,7 +195,7 @@ static line_event_t take(uint8_t *bytes)
         }
         if (byte == TERMINAL_PORT_DAMAGED) {
             line_damage(&line);
-        } else if (!line_is_blank(&line) || begin_line((uint8_t)byte)) {
+        } else if (line_begun(&line) || begin_line((uint8_t)byte)) {
             const line_event_t event = line_take(&line, (uint8_t)byte);
             if (event > LINE_APPENDED) {
                 --*bytes;
@@ -212,7 +215,7 @@ bool terminal_poll(void)
         if (event == LINE_ERASED) {
             erase();
         }
-        if (!behind) {
+        if (!terminal.behind) {
             worked |= echo();
         }
         if (event != LINE_ENDED) {
@@ -229,7 +232,7 @@ bool terminal_poll(void)
             break;
         }
     }
-    if (behind && terminal_port_waiting() <= PRESSED_BYTES) {
+    if (terminal.behind && terminal_port_waiting() <= PRESSED_BYTES) {
         worked |= pay();
     }
     return worked || bytes != BYTES_AT_ONCE;

@@ -1,5 +1,6 @@
 #include "cli/text.h"
 #include "base/flash.h"
+#include "base/inline.h"
 #include "base/number.h"
 #include "cli/terminal_port.h"
 
@@ -13,13 +14,12 @@ void text_put_flash(const char *text)
 void text_put_decimal(uint32_t value, uint8_t decimals)
 {
     char text[NUMBER_TEXT_BYTES];
-    number_format(text, value, decimals);
-    for (const char *c = text; *c != '\0'; c++) {
+    for (const char *c = number_format(text, value, decimals); *c != '\0'; c++) {
         terminal_port_put((uint8_t)*c);
     }
 }
 
-void text_put_u32(uint32_t value)
+NOINLINE void text_put_u32(uint32_t value)
 {
     text_put_decimal(value, 0);
 }

@@ -7,7 +7,7 @@
 
 #include <stdint.h>
 
-void timebase_start(void); /* from 0 */
+void timebase_start(void); /* from 0, also while it runs */
 void timebase_stop(void);
 uint32_t timebase_us(void);
 

@@ -2,6 +2,7 @@
  * Source: ATmega328P datasheet DS40002061, section 20. */
 #include <avr/io.h>
 #include "base/atomic.h"
+#include "base/inline.h"
 #include "cli/terminal_port.h"
 #include "hal/baud.h"
 #include "hal/usart.h"
@@ -32,7 +33,7 @@ int16_t terminal_port_get(void)
     return byte;
 }
 
-uint8_t terminal_port_waiting(void)
+NOINLINE uint8_t terminal_port_waiting(void)
 {
     const uint8_t head = usart_rx_head;
     const uint8_t tail = usart_rx_tail;

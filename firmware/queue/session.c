@@ -1,4 +1,5 @@
 #include "queue/session.h"
+#include "base/inline.h"
 #include "settings.h"
 
 session_t session;
@@ -7,11 +8,11 @@ void session_init(void)
 {
     session.velocity = settings.cycle_us;
     session.flags = MOTION_CYCLE;
-    session_set_linear(settings.ramp != 0);
+    session_set_linear(settings.ramp);
     session_set_pulses(settings.full_step == 0);
 }
 
-static void set_flag(uint8_t flag, bool on)
+static void set_flag(uint8_t flag, uint8_t on)
 {
     session.flags |= flag;
     if (!on) {
@@ -19,7 +20,7 @@ static void set_flag(uint8_t flag, bool on)
     }
 }
 
-void session_set_linear(bool linear)
+NOINLINE void session_set_linear(uint8_t linear)
 {
     set_flag(MOTION_LINEAR, linear);
     session.accel = settings.accel[linear];
@@ -31,7 +32,7 @@ void session_set_pulses(bool pulses)
     set_flag(MOTION_PULSES, pulses);
 }
 
-void session_template(const session_t *from, motion_command_t *command)
+NOINLINE void session_template(const session_t *from, motion_command_t *command)
 {
     command->count = 0;
     command->velocity = from->velocity;

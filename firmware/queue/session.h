@@ -26,8 +26,8 @@ extern session_t session;
 
 void session_init(void); /* from the settings */
 
-/* Selects the ramp; accel and decel become the system defaults of that ramp (LIN-013). */
-void session_set_linear(bool linear);
+/* Selects the ramp, 0 harmonic, 1 linear; accel and decel become the system defaults of that ramp (LIN-013). */
+void session_set_linear(uint8_t linear);
 
 /* Counts are pulses (true) or full steps. */
 void session_set_pulses(bool pulses);

@@ -81,7 +81,7 @@ static void test_escape_clears_the_line_and_what_was_wrong_with_it(void)
 {
     type("m2000");
     TEST_ASSERT_EQUAL(LINE_CLEARED, line_take(&line, 0x1B));
-    TEST_ASSERT_TRUE(line_is_blank(&line));
+    TEST_ASSERT_EQUAL(0, line_begun(&line));
     TEST_ASSERT_EQUAL(LINE_UNCHANGED, line_take(&line, 0x1B));
     line_damage(&line);
     type("\x1Bq\r");
@@ -96,7 +96,7 @@ static void test_other_control_characters_are_ignored(void)
             take(c);
         }
     }
-    TEST_ASSERT_TRUE(line_is_blank(&line));
+    TEST_ASSERT_EQUAL(0, line_begun(&line));
 }
 
 static void test_a_line_of_64_characters_is_taken(void)
@@ -130,7 +130,7 @@ static void test_taking_characters_back_does_not_mend_a_line_that_was_too_long(v
     for (int i = 0; i < 70; i++) {
         take('\b');
     }
-    TEST_ASSERT_FALSE(line_is_blank(&line));
+    TEST_ASSERT_NOT_EQUAL(0, line_begun(&line));
     type("g\r");
     TEST_ASSERT_EQUAL(STATUS_LINE_TOO_LONG, ended_status[0]);
 }
@@ -150,7 +150,7 @@ static void test_a_damaged_byte_refuses_its_line_and_no_other(void)
 static void test_a_line_whose_first_byte_was_lost_is_not_blank(void)
 {
     line_damage(&line);
-    TEST_ASSERT_FALSE(line_is_blank(&line));
+    TEST_ASSERT_NOT_EQUAL(0, line_begun(&line));
 }
 
 int main(void)
