@@ -1124,21 +1124,12 @@ void engine_stop_graceful(accel_code_t decel, bool linear)
     end_command(decel, linear);
 }
 
-bool engine_next(void)
-{
-    look_for_end();
-    if (joined) /* it ends within JOIN_SOON_TICKS */
-        return false;
-    end_command(ACCEL_NONE, false);
-    return true;
-}
-
-bool engine_next_graceful(void)
+bool engine_next(bool graceful)
 {
     look_for_end();
     if (joined)
         return false;
-    end_command(command.decel, (command.flags & MOTION_LINEAR) != 0);
+    end_command(graceful ? command.decel : ACCEL_NONE, (command.flags & MOTION_LINEAR) != 0);
     return true;
 }
 

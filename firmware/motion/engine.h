@@ -39,8 +39,9 @@ uint8_t engine_commands_ended(void);
 
 void engine_stop(void);                                     /* S: no further pulse; everything taken is dropped */
 void engine_stop_graceful(accel_code_t decel, bool linear); /* s: ramp down from the present speed, drop the rest */
-bool engine_next(void);                                     /* N: end the running command now; false: ask again later */
-bool engine_next_graceful(void);                            /* n: end it with its own deceleration */
+/* N: end the running command now; n: with its own deceleration. False: it ends by itself within 10 ms, and the next one
+ * has begun; ask again later if that is to be ended too. */
+bool engine_next(bool graceful);
 
 /* One pulse, at once; ignored unless in STANDBY. */
 void engine_single_pulse(bool ccw);

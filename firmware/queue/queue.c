@@ -8,13 +8,14 @@
 enum { NONE = 0xFF }; /* no position */
 
 typedef enum { RUN_NOTHING, RUN_LOOP, RUN_ARRAY } run_t;
+typedef enum { END_NOT, END_NOW, END_GRACEFULLY } end_t;
 
 static motion_command_t entries[QUEUE_POSITIONS];
 static uint8_t array[QUEUE_ARRAY];
 static uint8_t next_available; /* 1..30 */
 static uint8_t pending;        /* 0..30: the entries before it */
 static uint8_t preempting;     /* position that comes before all others, or NONE */
-static bool (*due)(void);      /* how what runs still has to be ended, as soon as it can be; or null */
+static end_t due;              /* how what runs still has to be ended, as soon as it can be */
 static uint8_t executing;      /* position of the command begun last */
 static uint8_t begun;          /* engine_commands_begun() that `executing` belongs to */
 
@@ -85,7 +86,7 @@ static void end_pass(uint8_t first)
 static void advance(void)
 {
     executing = choose();
-    due = 0;
+    due = END_NOT;
     if (preempting != NONE) {
         preempting = NONE;
     } else if (last_of_loop) {
@@ -128,8 +129,8 @@ static NOINLINE bool offer(void)
 bool queue_poll(void)
 {
     const bool changed = note_begun();
-    if (due && due()) {
-        due = 0;
+    if (due != END_NOT && engine_next(due == END_GRACEFULLY)) {
+        due = END_NOT;
     }
     return offer() || changed;
 }
@@ -145,7 +146,7 @@ void queue_init(void)
     next_available = QUEUE_FIRST;
     pending = 0;
     preempting = NONE;
-    due = 0;
+    due = END_NOT;
     undo_position = 0;
     begun = engine_commands_begun();
     end_loop();
@@ -212,7 +213,7 @@ void queue_preempt(uint8_t position)
 {
     (void)note_begun();
     preempting = position;
-    due = engine_next;
+    due = END_NOW;
     (void)queue_poll();
 }
 
@@ -301,7 +302,7 @@ void queue_loop_end(void)
 {
     end_loop();
     if (is_continuous()) {
-        due = engine_next_graceful;
+        due = END_GRACEFULLY;
     }
     (void)queue_poll();
 }
@@ -313,7 +314,7 @@ static void forget(void)
     end_loop();
     pending = 0;
     preempting = NONE;
-    due = 0;
+    due = END_NOT;
     engine_offer(0);
 }
 
@@ -333,10 +334,10 @@ void queue_stop_graceful(accel_code_t decel, bool linear)
 
 /* Where the engine cannot end the running command it ends by itself within 10 ms. If that is not the one begun last, but
  * continuous motion is, it shall end too; and a loop that it has interrupted executes one more command. */
-static void end_running(bool (*how)(void))
+static void end_running(end_t how)
 {
     (void)note_begun();
-    if (!how() && is_continuous()) {
+    if (!engine_next(how == END_GRACEFULLY) && is_continuous()) {
         due = how;
     }
     last_of_loop = run != RUN_NOTHING && is_continuous();
@@ -344,12 +345,12 @@ static void end_running(bool (*how)(void))
 
 void queue_next(void)
 {
-    end_running(engine_next);
+    end_running(END_NOW);
 }
 
 void queue_next_graceful(void)
 {
-    end_running(engine_next_graceful);
+    end_running(END_GRACEFULLY);
 }
 
 uint8_t queue_next_position(void)

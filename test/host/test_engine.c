@@ -743,7 +743,7 @@ static void test_graceful_ends_in_any_phase_never_jump_and_lose_no_pulse(void)
             run_for(at);
             bool running = engine_state() != MOTION_STANDBY || !step_player_stopped();
             if (kind & 1)
-                engine_next_graceful();
+                engine_next(true);
             else
                 engine_stop_graceful(100, false);
             run_to_end();
@@ -777,7 +777,7 @@ static void test_next_ends_the_command_and_goes_on_with_the_queued_one(void)
         submit(move(-100, 100, 1, 1));
         run_for(at);
         uint64_t edges = step_player_edges();
-        engine_next();
+        engine_next(false);
         run_to_end();
         /* What had been handed to the timer may still be made; then exactly 100 backwards. */
         int64_t first = (int64_t)step_player_edges() - 100;
@@ -795,7 +795,7 @@ static void test_graceful_next_goes_on_with_the_queued_command(void)
         submit(move(200, 100, 1, 1));
         submit(move(-100, 100, 1, 1));
         run_for(at);
-        engine_next_graceful();
+        engine_next(true);
         run_to_end();
         assert_ended_at((int32_t)step_player_edges() - 200);
         TEST_ASSERT_EQUAL_UINT8(2, ended());
@@ -808,7 +808,7 @@ static void test_graceful_next_without_deceleration_leaves_the_velocity_in_play(
     submit(move(20000, 100, 1, 999));
     submit(move(300, 100, 1, 1));
     run_for(20000000);
-    engine_next_graceful();
+    engine_next(true);
     run_to_end();
     assert_ended_at((int32_t)step_player_edges());
     TEST_ASSERT_EQUAL_UINT8(2, ended());
@@ -822,12 +822,12 @@ static void test_next_with_nothing_queued_ends_in_standby(void)
 {
     submit(move(200, 100, 1, 1));
     run_for(12000000);
-    engine_next();
+    engine_next(false);
     run_to_end();
     assert_ended_at((int32_t)step_player_edges());
     TEST_ASSERT_TRUE(step_player_edges() < 200);
-    engine_next();
-    engine_next_graceful();
+    engine_next(false);
+    engine_next(true);
     run_to_end();
     TEST_ASSERT_EQUAL_UINT8(1, ended());
 }

@@ -82,15 +82,13 @@ void engine_stop_graceful(accel_code_t decel, bool linear)
     engine_fake.graceful_linear = linear;
 }
 
-bool engine_next(void)
+bool engine_next(bool graceful)
 {
-    engine_fake.nexts++;
-    return !engine_fake.cannot_end;
-}
-
-bool engine_next_graceful(void)
-{
-    engine_fake.nexts_graceful++;
+    if (graceful) {
+        engine_fake.nexts_graceful++;
+    } else {
+        engine_fake.nexts++;
+    }
     return !engine_fake.cannot_end;
 }
 
