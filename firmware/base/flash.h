@@ -17,6 +17,10 @@ static inline uint8_t flash_u8(const void *address)
 {
     return pgm_read_byte(address);
 }
+static inline uint16_t flash_u16(const void *address)
+{
+    return pgm_read_word(address);
+}
 static inline uint32_t flash_u32(const void *address)
 {
     return pgm_read_dword(address);
@@ -33,6 +37,10 @@ static inline const void *flash_pointer(const void *address)
 static inline uint8_t flash_u8(const void *address)
 {
     return *(const uint8_t *)address;
+}
+static inline uint16_t flash_u16(const void *address)
+{
+    return *(const uint16_t *)address;
 }
 static inline uint32_t flash_u32(const void *address)
 {

@@ -1,6 +1,7 @@
 #include "cli/commands.h"
 #include "base/flash.h"
 #include "base/inline.h"
+#include "base/number.h"
 #include "base/zeroed.h"
 #include "cli/display.h"
 #include "cli/motion_syntax.h"
@@ -26,6 +27,18 @@ typedef struct {
 
 static bool debugging;
 
+/* What a line is read as. */
+static enum { MODE_COMMANDS, MODE_QUEUE, MODE_ARRAY } mode;
+
+/* A range of numbers, and how an error names it. */
+typedef struct {
+    uint16_t least, most;
+    char text[10];
+} range_t;
+static const range_t positions FLASH = {QUEUE_FIRST, QUEUE_LAST, "1..30"};
+static const range_t array_entries FLASH = {0, QUEUE_ARRAY - 1, "0..30"};
+static const range_t counts FLASH = {0, UINT16_MAX, "0..65535"};
+
 /* The motion command, or single value, being read ahead: how many characters of the line it has seen, 0 for none. */
 static motion_syntax_t ahead;
 static uint8_t characters_ahead;
@@ -38,19 +51,208 @@ static uint8_t more(char c)
 
 /* -- handlers: rest is what follows the command's letters, up to the space or the end of the line --------------------- */
 
+/* The number that *rest begins with; *rest is then what follows it. */
+static NOINLINE status_t read_number(const char **rest, uint16_t *number, const range_t *range)
+{
+    uint32_t value = 0;
+    const char *text = *rest;
+    uint8_t digit = (uint8_t)(*text - '0');
+    if (digit > 9) {
+        return more(*text) ? STATUS_SYNTAX : STATUS_NUMBER_MISSING;
+    }
+    do {
+        if (!number_add_digit(&value, digit)) {
+            return STATUS_NUMBER_TOO_LARGE;
+        }
+        digit = (uint8_t)(*++text - '0');
+    } while (digit <= 9);
+    *rest = text;
+    *number = (uint16_t)value;
+    if (value < flash_u16(&range->least) || value > flash_u16(&range->most)) {
+        ahead.range = range->text;
+        return STATUS_RANGE;
+    }
+    return STATUS_OK;
+}
+
+/* The same, and nothing follows it. */
+static NOINLINE status_t read_only_number(const char *rest, uint16_t *number, const range_t *range)
+{
+    const status_t status = read_number(&rest, number, range);
+    return status == STATUS_OK && more(*rest) ? STATUS_SYNTAX : status;
+}
+
 /* m, and v, vc, a, d alone: all of the line has been read ahead. */
 static status_t command_read_ahead(const char *rest)
 {
     (void)rest;
     status_t status = motion_syntax_end(&ahead);
-    if (status == STATUS_OK && !ahead.single) {
-        status = queue_add(&ahead.command);
-        /* it begins at once: everything else can wait */
+    if (status != STATUS_OK) {
+        return status;
+    }
+    if (!ahead.single && ahead.command.count == 0) {
+        queue_preempt_with(QUEUE_CONTINUOUS, &ahead.command);
+        return status; /* what it names it keeps for itself (manual line 588) */
+    }
+    if (!ahead.single) {
+        status = queue_add(&ahead.command); /* it begins at once: everything else can wait */
     }
     if (status == STATUS_OK) {
         motion_syntax_keep(&ahead, &session);
+        if (ahead.single) {
+            queue_follow(&ahead.command);
+        }
     }
     return status;
+}
+
+static NOINLINE void read_rest(const char *rest)
+{
+    while (*rest != '\0') {
+        motion_syntax_take(&ahead, *rest++);
+    }
+}
+
+/* xm...: a motion command that is not kept. */
+static status_t command_one_shot(const char *rest)
+{
+    motion_syntax_begin(&ahead, 'm', &session);
+    read_rest(rest);
+    const status_t status = motion_syntax_end(&ahead);
+    if (status == STATUS_OK) {
+        queue_preempt_with(ahead.command.count == 0 ? QUEUE_CONTINUOUS : QUEUE_ONE_SHOT, &ahead.command);
+    }
+    return status;
+}
+
+/* x leaves a program mode; x<position> executes an entry. */
+static status_t command_xref(const char *rest)
+{
+    if (!more(*rest)) {
+        return STATUS_OK;
+    }
+    uint16_t position;
+    const status_t status = read_only_number(rest, &position, &positions);
+    if (status == STATUS_OK) {
+        queue_preempt((uint8_t)position);
+    }
+    return status;
+}
+
+static status_t command_run_array(const char *rest)
+{
+    (void)rest;
+    return queue_array_run(0);
+}
+
+static status_t command_program_array(const char *rest)
+{
+    (void)rest;
+    mode = MODE_ARRAY;
+    return display_request(DISPLAY_ARRAY);
+}
+
+/* In that mode: <entry>,<position>. */
+static status_t program_array(const char *line)
+{
+    uint16_t entry, position;
+    status_t status = read_number(&line, &entry, &array_entries);
+    if (status == STATUS_OK && *line++ != ',') {
+        status = STATUS_SYNTAX;
+    }
+    if (status == STATUS_OK) {
+        status = read_only_number(line, &position, &array_entries);
+    }
+    if (status == STATUS_OK) {
+        queue_array_set((uint8_t)entry, (uint8_t)position);
+        status = display_request(DISPLAY_ARRAY);
+    }
+    return status;
+}
+
+/* l ends, l<passes> runs the array. */
+static status_t command_loop(const char *rest)
+{
+    if (!more(*rest)) {
+        queue_loop_end();
+        return STATUS_OK;
+    }
+    uint16_t passes;
+    const status_t status = read_only_number(rest, &passes, &counts);
+    return status == STATUS_OK ? queue_array_run(passes) : status;
+}
+
+/* ls and lf */
+static status_t command_loop_bound(const char *rest)
+{
+    const queue_bound_t bound = (rest[-1] | 0x20) == 's' ? QUEUE_LOOP_START : QUEUE_LOOP_FINISH;
+    uint16_t position;
+    const status_t status = read_only_number(rest, &position, &positions);
+    return status == STATUS_OK ? queue_loop_bound(bound, (uint8_t)position) : status;
+}
+
+static status_t command_loop_passes(const char *rest)
+{
+    uint16_t passes = 0;
+    const status_t status = more(*rest) ? read_only_number(rest, &passes, &counts) : STATUS_OK;
+    if (status == STATUS_OK) {
+        queue_loop_passes(passes);
+    }
+    return status;
+}
+
+static status_t command_loop_all(const char *rest)
+{
+    (void)rest;
+    queue_loop_from_first(QUEUE_LAST);
+    return STATUS_OK;
+}
+
+static status_t command_program_queue(const char *rest)
+{
+    (void)rest;
+    mode = MODE_QUEUE;
+    return STATUS_OK;
+}
+
+static status_t command_clear_queue(const char *rest)
+{
+    (void)rest;
+    queue_clear();
+    return STATUS_OK;
+}
+
+/* q<position>...: an entry is edited, or with nothing more shown. */
+static status_t command_edit(const char *rest)
+{
+    uint16_t position;
+    status_t status = read_number(&rest, &position, &positions);
+    if (status != STATUS_OK) {
+        return status;
+    }
+    if (!more(*rest)) {
+        return display_request((display_t)(DISPLAY_ROW + position));
+    }
+    motion_syntax_begin_edit(&ahead, queue_entry((uint8_t)position));
+    read_rest(rest);
+    status = motion_syntax_end(&ahead);
+    if (status == STATUS_OK) {
+        queue_edit((uint8_t)position, &ahead.command);
+    }
+    return status;
+}
+
+static status_t command_undo(const char *rest)
+{
+    (void)rest;
+    return queue_undo();
+}
+
+static status_t command_release(const char *rest)
+{
+    (void)rest;
+    engine_release();
+    return STATUS_OK;
 }
 
 static status_t command_pulse_cw(const char *rest)
@@ -213,6 +415,7 @@ void commands_init(void)
 {
     session_init();
     AT_BOOT_ZERO(debugging);
+    mode = MODE_COMMANDS;
     AT_BOOT_ZERO(characters_ahead);
 }
 
@@ -222,7 +425,7 @@ void commands_read_ahead(const char *line, uint8_t length)
     if (i == 0 || i > length) {
         characters_ahead = 0;
         const uint8_t letter = (uint8_t)line[0] | 0x20u;
-        if (length == 0 || (letter != 'm' && letter != 'v' && letter != 'a' && letter != 'd')) {
+        if (length == 0 || mode != MODE_COMMANDS || (letter != 'm' && letter != 'v' && letter != 'a' && letter != 'd')) {
             return; /* not read by the rules of motion_syntax.h */
         }
         motion_syntax_begin(&ahead, line[0], &session);
@@ -237,11 +440,24 @@ void commands_read_ahead(const char *line, uint8_t length)
 /* By the table. */
 static NOINLINE status_t execute_by_table(const char *line)
 {
-    if ((uint8_t)(line[0] - '0') <= 9) {
-        return STATUS_NOT_YET; /* a network address: TRM-006 */
-    }
     if (!more(line[0])) {
         return STATUS_OK;
+    }
+    const bool digit = (uint8_t)(line[0] - '0') <= 9;
+    if (mode != MODE_COMMANDS) {
+        if (digit) {
+            return mode == MODE_QUEUE ? command_edit(line) : program_array(line);
+        }
+        if ((line[0] | 0x20) == 'x' && !more(line[1])) {
+            mode = MODE_COMMANDS;
+            return STATUS_OK;
+        }
+        if ((line[0] | 0x20) != 's' && (line[0] | 0x20) != 'q' && line[0] != '?') {
+            return STATUS_SYNTAX; /* nothing that would move the motor */
+        }
+    }
+    if (digit) {
+        return STATUS_NOT_YET; /* a network address: TRM-006 */
     }
     if (line[0] == '$') {
         queue_stop();
@@ -268,11 +484,16 @@ const char *commands_refused_range(void)
 
 bool commands_at_once(char character)
 {
-    if (character != '+' && character != '-') {
+    if (mode != MODE_COMMANDS || (character != '+' && character != '-')) {
         return false;
     }
     engine_single_pulse(character == '-');
     return true;
+}
+
+const char *commands_prompt(void)
+{
+    return mode == MODE_COMMANDS ? FLASH_TEXT("SAC>") : mode == MODE_QUEUE ? FLASH_TEXT("Q>") : FLASH_TEXT("X>");
 }
 
 bool commands_debugging(void)

@@ -30,6 +30,8 @@ bool commands_at_once(char character);
 /* What `?` prints, in flash: form, tab, words of each command. */
 extern const char commands_help[];
 
+const char *commands_prompt(void); /* in flash: that of the mode */
+
 bool commands_debugging(void);
 
 #endif

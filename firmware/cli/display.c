@@ -40,6 +40,7 @@ _Static_assert((SHOWN_GAP & SESSION_FLAGS) == 0, "a flag of its own");
 #define POSITION "\x8B"
 #define STATE "\x8C"
 #define FAULTS "\x8D"
+#define ENTRY "\x8E"
 enum {
     FIELD_COUNT = 0x80,
     FIELD_RPM,
@@ -55,6 +56,7 @@ enum {
     FIELD_POSITION,
     FIELD_STATE,
     FIELD_FAULTS,
+    FIELD_ENTRY,
 };
 
 /* A choice between two texts: the first one if the command has the flag that is in these bits of the character. */
@@ -92,6 +94,7 @@ static const char defaults_text[] FLASH =
     "ops 36, soft_ops off, CRC 1, ACK on\r\n";
 /* clang-format on */
 
+static const char array_text[] FLASH = "x_ " ROW " " ENTRY "\r\n";
 static const char velocity_text[] FLASH = VELOCITY "\r\n";
 static const char position_text[] FLASH = "position " POSITION " " STATE " faults " FAULTS "\r\n";
 
@@ -99,6 +102,7 @@ static const char position_text[] FLASH = "position " POSITION " " STATE " fault
 static const char *const texts[] FLASH = {
     [DISPLAY_QUEUE] = queue_text,       [DISPLAY_DEFAULTS] = defaults_text, [DISPLAY_VELOCITY] = velocity_text,
     [DISPLAY_POSITION] = position_text, [DISPLAY_HELP] = commands_help,
+    [DISPLAY_ARRAY] = array_text,
 };
 
 /* Indexed by motion_state_t. */
@@ -144,6 +148,7 @@ static NOINLINE void print_field(uint8_t field, const motion_command_t *command)
         }
         break;
     case FIELD_STATE: text_put_flash(state_words[engine_state()]); return;
+    case FIELD_ENTRY: number = queue_array(shown.row); break;
     default: number = engine_faults(); break;
     }
     text_put_u32(number);
@@ -152,8 +157,14 @@ static NOINLINE void print_field(uint8_t field, const motion_command_t *command)
 static void begin(uint8_t display)
 {
     shown.current = display;
+    if (display > DISPLAY_ROW) {
+        shown.current = DISPLAY_ROW;
+        shown.row = (uint8_t)(display - DISPLAY_ROW);
+        shown.text = queue_row_text;
+        return;
+    }
     shown.text = flash_pointer(&texts[display]);
-    shown.row = commands_debugging() ? UINT8_MAX : 0; /* position 0 is shown in debug mode only */
+    shown.row = display == DISPLAY_QUEUE && commands_debugging() ? UINT8_MAX : 0; /* to show position 0 as well */
     shown.session = session;
     if (engine_gap()) {
         shown.session.flags |= SHOWN_GAP;
@@ -164,15 +175,19 @@ static void begin(uint8_t display)
 static void next_text(void)
 {
     const char *text = 0;
+    const uint8_t before = shown.row++;
+    const uint8_t row = shown.row;
     if (shown.current == DISPLAY_QUEUE) {
-        const uint8_t row = ++shown.row;
-        if (row <= QUEUE_LAST) {
+        if (row <= QUEUE_LAST || (row == QUEUE_ONE_SHOT && commands_debugging())) {
             text = queue_row_text;
-        } else if (row == QUEUE_LAST + 1) {
+        } else if (row <= QUEUE_ONE_SHOT + 1) {
             text = queue_end_text;
-        } else if (row == QUEUE_LAST + 2 && commands_debugging()) {
+            shown.row = QUEUE_ONE_SHOT + 1;
+        } else if (row == QUEUE_ONE_SHOT + 2 && commands_debugging()) {
             text = queue_executing_text;
         }
+    } else if (shown.current == DISPLAY_ARRAY && row < QUEUE_ARRAY && queue_array(before) != 0) {
+        text = array_text;
     }
     shown.text = text;
     if (text == 0 && shown.waiting_count > 0) {
@@ -197,7 +212,7 @@ static NOINLINE void print_piece(void)
     motion_command_t defaults; /* or a row of the queue: the command whose values are shown */
     const motion_command_t *command = &defaults;
     session_template(&shown.session, &defaults);
-    if (shown.current == DISPLAY_QUEUE && shown.row < QUEUE_POSITIONS) {
+    if ((shown.current == DISPLAY_QUEUE || shown.current == DISPLAY_ROW) && shown.row < QUEUE_POSITIONS) {
         command = queue_entry(shown.row);
     }
     const char *text = shown.text;

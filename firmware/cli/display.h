@@ -20,6 +20,8 @@ typedef enum {
     DISPLAY_VELOCITY, /* vd */
     DISPLAY_POSITION, /* p */
     DISPLAY_HELP,     /* ? */
+    DISPLAY_ARRAY,    /* xd */
+    DISPLAY_ROW = 32, /* and a position: one row of the queue */
     DISPLAYS
 } display_t;
 

@@ -55,6 +55,8 @@ enum {
     GIVEN_ACCEL = 1 << 1, /* a */
     GIVEN_DECEL = 1 << 2,
     ENDED = 1 << 3, /* a space was met */
+    GIVEN_UNIT = 1 << 4, /* f or p */
+    EDITS = 1 << 5, /* an entry of the queue: what is not given stays as it is */
 };
 
 const char motion_syntax_range_flag[] FLASH = "0..1";
@@ -135,6 +137,12 @@ static NOINLINE void close_parameter(motion_syntax_t *syntax)
         command->count = value;
         flag = MOTION_CCW;
         on = has(syntax, HAS_DIGIT | HAS_MINUS) ? number & HAS_MINUS : settings.direction;
+        if ((syntax->given & (EDITS | GIVEN_UNIT)) == EDITS) {
+            command->flags &= (uint8_t)~MOTION_PULSES;
+            if (value == 0) {
+                refuse(syntax, STATUS_NUMBER_MISSING);
+            }
+        }
         break;
     case PARAMETER_VELOCITY:
     case PARAMETER_CYCLE:
@@ -166,12 +174,13 @@ static NOINLINE void close_parameter(motion_syntax_t *syntax)
         break;
     case PARAMETER_WAIT: command->start_wait_us = value; break;
     case PARAMETER_SYNC: flag = MOTION_SYNC; break;
-    case PARAMETER_FULL_STEP: flag = MOTION_PULSES; break;
+    case PARAMETER_FULL_STEP:
     case PARAMETER_PULSES:
         flag = MOTION_PULSES;
-        on = 1;
+        on = (uint8_t)(syntax->parameter - PARAMETER_FULL_STEP);
+        syntax->given |= GIVEN_UNIT;
         break;
-    case PARAMETERS: break; /* not a parameter: the number of them */
+    case PARAMETERS: return; /* not a parameter: the beginning of an edit */
     }
     if (flag & (MOTION_LINEAR | MOTION_SYNC)) { /* 0 or 1, 1 without a number */
         if (value > 1) {
@@ -232,7 +241,7 @@ static void take_minus(motion_syntax_t *syntax)
 static void take_letter(motion_syntax_t *syntax, uint8_t letter)
 {
     const uint8_t parameter = letter < 26 ? flash_u8(&parameter_by_letter[letter]) : PARAMETER_COUNT;
-    if (parameter == PARAMETER_COUNT) {
+    if (parameter == PARAMETER_COUNT && (letter != 'm' - 'a' || !(syntax->given & EDITS))) {
         refuse(syntax, STATUS_SYNTAX);
         return;
     }
@@ -261,6 +270,17 @@ void motion_syntax_begin(motion_syntax_t *syntax, char first_letter, const sessi
     syntax->given = 0;
     open_parameter(syntax, flash_u8(&parameter_by_letter[(first_letter | 0x20) - 'a']));
     syntax->single = syntax->parameter; /* the count's number is 0 */
+}
+
+void motion_syntax_begin_edit(motion_syntax_t *syntax, const motion_command_t *entry)
+{
+    NEAR(syntax);
+    syntax->command = *entry;
+    syntax->status = STATUS_OK;
+    syntax->given = EDITS;
+    syntax->parameter = PARAMETERS;
+    syntax->number = NO_NUMBER;
+    syntax->single = 0;
 }
 
 static void take_other(motion_syntax_t *syntax, uint8_t c)
@@ -300,7 +320,10 @@ void motion_syntax_take(motion_syntax_t *syntax, char character)
 static void resolve_ramp(motion_syntax_t *syntax)
 {
     motion_command_t *command = &syntax->command;
-    const uint8_t given = syntax->given;
+    uint8_t given = syntax->given;
+    if (given & EDITS) {
+        given = 0;
+    }
     const uint8_t linear = command->flags & MOTION_LINEAR ? 1 : 0;
     if (command->accel == 0 || (given & (GIVEN_RAMP | GIVEN_ACCEL)) == GIVEN_RAMP) {
         command->accel = settings.accel[linear];
@@ -326,8 +349,6 @@ status_t motion_syntax_end(motion_syntax_t *syntax)
             return STATUS_OK; /* a or d */
         }
         command->count = 1; /* the engine checks commands: is this velocity possible at all? */
-    } else if (command->count == 0) {
-        return STATUS_NOT_YET; /* continuous motion */
     }
     return engine_check(command);
 }

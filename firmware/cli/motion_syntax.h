@@ -10,8 +10,8 @@
  *          keep two decimals below 100 and none from 100. l without a or d takes the defaults of that ramp for what is
  *          not given (decided at the end of the line, because parameters come in any order).
  * Context: main loop. Cost: about 60 cycles a character.
- * Errors:  STATUS_SYNTAX, NUMBER_MISSING, NUMBER_TOO_LARGE, RANGE, VELOCITY_ZERO, PERIOD_TOO_SHORT, NOT_YET (a motion
- *          without a count is continuous); the first one stands. Nothing but the parser changes.
+ * Errors:  STATUS_SYNTAX, NUMBER_MISSING, NUMBER_TOO_LARGE, RANGE, VELOCITY_ZERO, PERIOD_TOO_SHORT; the first
+ *          one stands. Nothing but the parser changes.
  * Tests:   test/host/test_motion_syntax.c
  * Source:  manual lines 239, 464-489, 499-549, 588, 634-638, 882-902. */
 #ifndef CLI_MOTION_SYNTAX_H
@@ -41,10 +41,15 @@ extern const char motion_syntax_range_flag[];
 /* Starts on the first letter: m, or v, a, d for the single commands. */
 void motion_syntax_begin(motion_syntax_t *syntax, char first_letter, const session_t *defaults);
 
+/* An entry of the queue is edited: parameters in any order, m[-]nnn among them, and what is not named stays. A count
+ * without p is in full steps; f or p alone change that without it. a and d without a number: the system default of the
+ * entry's ramp. STATUS_NUMBER_MISSING: no count, or 0. */
+void motion_syntax_begin_edit(motion_syntax_t *syntax, const motion_command_t *entry);
+
 /* The next character of the line. */
 void motion_syntax_take(motion_syntax_t *syntax, char character);
 
-/* The end of the line. STATUS_OK: syntax->command is complete and executable. */
+/* The end of the line. STATUS_OK: syntax->command is complete and executable; with count 0 it is continuous motion. */
 status_t motion_syntax_end(motion_syntax_t *syntax);
 
 /* What a complete command leaves as session defaults: all but count, direction, sync, start wait and extra pulses. */

@@ -17,7 +17,6 @@ enum { BYTES_AT_ONCE = 28 };
 enum { PRESSED_BYTES = 16, PRESSED_LINES = 3 };
 
 static const char version_line[] FLASH = "SAC " VERSION_NUMBER " " VERSION_DATE "\r\n";
-static const char prompt[] FLASH = "SAC>";
 
 static line_t line;
 
@@ -92,7 +91,7 @@ static NOINLINE bool pay(void)
         put_error();
         t->owed_status = STATUS_OK;
     } else {
-        text_put_flash(prompt);
+        text_put_flash(commands_prompt());
         t->behind = false;
     }
     return true;
@@ -182,7 +181,7 @@ void terminal_init(void)
     AT_BOOT_ZERO(terminal);
     display_init();
     text_put_flash(version_line);
-    text_put_flash(prompt);
+    text_put_flash(commands_prompt());
 }
 
 /* Takes what has arrived, up to the first byte that ends or changes a line otherwise than by one more character. */

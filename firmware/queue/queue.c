@@ -253,8 +253,8 @@ static void begin_run(run_t what, uint8_t first)
 
 status_t queue_loop_bound(queue_bound_t bound, uint8_t position)
 {
-    if (position < QUEUE_FIRST || position > QUEUE_LAST || position == bounds[1 - bound]) {
-        return STATUS_RANGE;
+    if (position == bounds[1 - bound]) {
+        return STATUS_LOOP_BOUNDS;
     }
     bounds[bound] = position;
     if (bounds[1 - bound] != 0 && run != RUN_LOOP) {

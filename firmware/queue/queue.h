@@ -52,7 +52,7 @@ void queue_follow(const motion_command_t *command);
 /* Gives the engine what comes next; true if anything changed. Call often. */
 bool queue_poll(void);
 
-/* The loop from a start to a finish, 1..30 and not the same (STATUS_RANGE): begins once both are known, after the
+/* The loop from a start to a finish, 1..30 and not the same (STATUS_LOOP_BOUNDS): begins once both are known, after the
  * running command; may be changed while it runs. autorun: 1 to `finish`, where they may be the same. */
 typedef enum { QUEUE_LOOP_START, QUEUE_LOOP_FINISH } queue_bound_t;
 status_t queue_loop_bound(queue_bound_t bound, uint8_t position);

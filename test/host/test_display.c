@@ -123,7 +123,7 @@ static void test_extra_pulses_and_start_wait_are_shown(void)
 }
 
 /* QUE-012, QUE-013, TRM-010 */
-static void test_debug_shows_position_0_and_what_is_executed(void)
+static void test_debug_shows_positions_0_and_31_and_what_is_executed(void)
 {
     TEST_ASSERT_NULL(strstr(shown("q"), "\r\n0\t"));
     execute("b");
@@ -131,7 +131,25 @@ static void test_debug_shows_position_0_and_what_is_executed(void)
     const char *text = shown("q");
     TEST_ASSERT_NOT_NULL(strstr(text, LINE_OF_70 "0\t200\t"));
     TEST_ASSERT_NOT_NULL(strstr(text, "s sync\r\nexecuting 1\r\n"));
-    TEST_ASSERT_NULL(strstr(text, "\r\n31\t"));
+    TEST_ASSERT_NOT_NULL(strstr(text, "\r\n31\t200\t"));
+}
+
+/* A-QUE-08 */
+static void test_one_row_is_shown_by_its_number(void)
+{
+    add("m7");
+    TEST_ASSERT_EQUAL_STRING("1\t7\t CW\t100\t3000\t 1.00\t1.00\t0\t  0\r\n", shown("q1"));
+}
+
+/* XRF-007, XRF-012 */
+static void test_the_array_is_shown_through_its_terminator(void)
+{
+    TEST_ASSERT_EQUAL_STRING("x_ 0 0\r\n", shown("xd"));
+    static const uint8_t positions[] = {1, 3, 7, 5, 0};
+    for (uint8_t i = 0; i < sizeof positions; i++) {
+        queue_array_set(i, positions[i]);
+    }
+    TEST_ASSERT_EQUAL_STRING("x_ 0 1\r\nx_ 1 3\r\nx_ 2 7\r\nx_ 3 5\r\nx_ 4 0\r\n", shown("xd"));
 }
 
 /* TRM-013, TRM-014, GAP-001, GAP-003 */
@@ -177,9 +195,13 @@ static void test_p_shows_position_state_and_faults(void)
 static void test_the_list_has_one_line_for_each_available_command(void)
 {
     const char *text = shown("?");
-    static const char *const forms[] = {"m[-]n", "vd", "v[n] vc<n>", "a[n.nn]", "d[n.nn]", "+",  "-",
-                                        "S",     "s",  "N",          "n",       "q",       "cf", "p",
-                                        "g",     "b",  "?",          "$L0 $L1", "$F",      "$P", "$U"};
+    static const char *const forms[] = {
+#define HELP(form, words) form,
+#define UNLISTED
+#define COMMAND(name, first, second, case_rule, argument, action, help) help
+#include "cli/commands.def"
+#undef COMMAND
+    };
     unsigned lines = 0;
     for (const char *c = text; *c != '\0'; c++) {
         lines += *c == '\n';
@@ -239,7 +261,9 @@ int main(void)
     RUN_TEST(test_the_columns_stand_where_the_manual_shows_them);
     RUN_TEST(test_rpm_and_cycle_are_shown_whichever_was_given);
     RUN_TEST(test_extra_pulses_and_start_wait_are_shown);
-    RUN_TEST(test_debug_shows_position_0_and_what_is_executed);
+    RUN_TEST(test_debug_shows_positions_0_and_31_and_what_is_executed);
+    RUN_TEST(test_one_row_is_shown_by_its_number);
+    RUN_TEST(test_the_array_is_shown_through_its_terminator);
     RUN_TEST(test_cf_shows_the_session_defaults_and_the_flags);
     RUN_TEST(test_vd_shows_rpm_and_cycle_of_the_velocity_in_play);
     RUN_TEST(test_p_shows_position_state_and_faults);

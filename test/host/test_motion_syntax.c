@@ -380,14 +380,101 @@ static void test_a_missing_number_is_refused_where_one_is_needed(void)
     assert_refused(STATUS_NUMBER_MISSING, "m200d.u5");
 }
 
-static void test_continuous_motion_is_not_available_yet(void)
+/* CON-001, CON-014 */
+static void test_a_motion_without_a_count_is_continuous(void)
 {
-    assert_refused(STATUS_NOT_YET, "m");
-    assert_refused(STATUS_NOT_YET, "m-");
-    assert_refused(STATUS_NOT_YET, "m0");
-    assert_refused(STATUS_NOT_YET, "m-0v50");
-    assert_refused(STATUS_NOT_YET, "mv120a.8d1.2");
+    static const char *const lines[] = {"m", "m-", "m0", "m-0v50", "mv120a.8d1.2"};
+    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
+        TEST_ASSERT_EQUAL_MESSAGE(STATUS_OK, read(lines[i]), lines[i]);
+        TEST_ASSERT_EQUAL_UINT32(0, command->count);
+        TEST_ASSERT_EQUAL_HEX8(lines[i][1] == '-' ? MOTION_CCW : 0, command->flags & MOTION_CCW);
+    }
     assert_refused(STATUS_SYNTAX, "mv120k");
+    assert_refused(STATUS_VELOCITY_ZERO, "mv0");
+}
+
+/* An entry that is edited, and what it is afterwards. */
+static status_t edit(motion_command_t *entry, const char *text)
+{
+    motion_syntax_t edited;
+    motion_syntax_begin_edit(&edited, entry);
+    while (*text != '\0') {
+        motion_syntax_take(&edited, *text++);
+    }
+    const status_t status = motion_syntax_end(&edited);
+    if (status == STATUS_OK) {
+        *entry = edited.command;
+    }
+    return status;
+}
+
+static const motion_command_t sample = {.count = 800,
+                                        .velocity = 150,
+                                        .start_wait_us = 3000,
+                                        .accel = 1047,
+                                        .decel = 500,
+                                        .extra_pulses = 7,
+                                        .flags = MOTION_LINEAR | MOTION_SYNC};
+
+/* QUE-027, QUE-028: the manual's example */
+static void test_an_edit_names_every_parameter(void)
+{
+    motion_command_t entry = sample;
+    TEST_ASSERT_EQUAL(STATUS_OK, edit(&entry, "m-2000vc1500a1d1l0pu0s0t0"));
+    const motion_command_t expected = {.count = 2000,
+                                       .velocity = 1500,
+                                       .accel = 100,
+                                       .decel = 100,
+                                       .flags = MOTION_CCW | MOTION_PULSES | MOTION_CYCLE};
+    TEST_ASSERT_EQUAL_MEMORY(&expected, &entry, sizeof entry);
+}
+
+/* QUE-029 */
+static void test_an_edit_leaves_what_it_does_not_name(void)
+{
+    motion_command_t entry = sample;
+    TEST_ASSERT_EQUAL(STATUS_OK, edit(&entry, "a2"));
+    motion_command_t expected = sample;
+    expected.accel = 200;
+    TEST_ASSERT_EQUAL_MEMORY(&expected, &entry, sizeof entry);
+    TEST_ASSERT_EQUAL(STATUS_OK, edit(&entry, "l0")); /* the ramp, not its values */
+    expected.flags &= (uint8_t)~MOTION_LINEAR;
+    TEST_ASSERT_EQUAL_MEMORY(&expected, &entry, sizeof entry);
+    TEST_ASSERT_EQUAL(STATUS_OK, edit(&entry, "d"));
+    expected.decel = settings.decel[0];
+    TEST_ASSERT_EQUAL_MEMORY(&expected, &entry, sizeof entry);
+}
+
+/* QUE-006, QUE-023 */
+static void test_an_edited_count_is_in_full_steps_unless_p_is_given(void)
+{
+    motion_command_t entry = sample;
+    TEST_ASSERT_EQUAL(STATUS_OK, edit(&entry, "p"));
+    TEST_ASSERT_EQUAL_HEX8(MOTION_LINEAR | MOTION_SYNC | MOTION_PULSES, entry.flags);
+    TEST_ASSERT_EQUAL_UINT32(800, entry.count);
+    TEST_ASSERT_EQUAL(STATUS_OK, edit(&entry, "v30"));
+    TEST_ASSERT_EQUAL_HEX8(MOTION_LINEAR | MOTION_SYNC | MOTION_PULSES, entry.flags);
+    TEST_ASSERT_EQUAL(STATUS_OK, edit(&entry, "m20"));
+    TEST_ASSERT_EQUAL_HEX8(MOTION_LINEAR | MOTION_SYNC, entry.flags);
+    TEST_ASSERT_EQUAL(STATUS_OK, edit(&entry, "pm20"));
+    TEST_ASSERT_EQUAL_HEX8(MOTION_LINEAR | MOTION_SYNC | MOTION_PULSES, entry.flags);
+    TEST_ASSERT_EQUAL(STATUS_OK, edit(&entry, "f"));
+    TEST_ASSERT_EQUAL_HEX8(MOTION_LINEAR | MOTION_SYNC, entry.flags);
+}
+
+static void test_a_refused_edit_changes_nothing(void)
+{
+    static const struct {
+        const char *text;
+        status_t status;
+    } refused[] = {{"m", STATUS_NUMBER_MISSING}, {"m0", STATUS_NUMBER_MISSING}, {"m5k", STATUS_SYNTAX},
+                   {"5", STATUS_SYNTAX},         {"v0", STATUS_VELOCITY_ZERO},  {"u256", STATUS_RANGE},
+                   {"vc1", STATUS_PERIOD_TOO_SHORT}};
+    for (size_t i = 0; i < sizeof refused / sizeof refused[0]; i++) {
+        motion_command_t entry = sample;
+        TEST_ASSERT_EQUAL_MESSAGE(refused[i].status, edit(&entry, refused[i].text), refused[i].text);
+        TEST_ASSERT_EQUAL_MEMORY(&sample, &entry, sizeof entry);
+    }
 }
 
 static void test_the_first_error_of_a_line_is_the_one_that_is_told(void)
@@ -413,7 +500,7 @@ static void test_random_lines_are_taken_whole_or_change_nothing(void)
         const session_t before = defaults;
         if (read(text) == STATUS_OK) {
             taken++;
-            TEST_ASSERT_TRUE(command->count > 0 && command->velocity > 0);
+            TEST_ASSERT_TRUE(command->velocity > 0);
             TEST_ASSERT_TRUE(command->accel >= 1 && command->accel <= ACCEL_NONE);
             TEST_ASSERT_TRUE(command->decel >= 1 && command->decel <= ACCEL_NONE);
             TEST_ASSERT_EQUAL_HEX8(0, defaults.flags & ~SESSION_FLAGS);
@@ -454,7 +541,11 @@ int main(void)
     RUN_TEST(test_numbers_are_taken_up_to_their_limit_and_refused_beyond);
     RUN_TEST(test_letters_and_signs_out_of_place_are_refused);
     RUN_TEST(test_a_missing_number_is_refused_where_one_is_needed);
-    RUN_TEST(test_continuous_motion_is_not_available_yet);
+    RUN_TEST(test_a_motion_without_a_count_is_continuous);
+    RUN_TEST(test_an_edit_names_every_parameter);
+    RUN_TEST(test_an_edit_leaves_what_it_does_not_name);
+    RUN_TEST(test_an_edited_count_is_in_full_steps_unless_p_is_given);
+    RUN_TEST(test_a_refused_edit_changes_nothing);
     RUN_TEST(test_the_first_error_of_a_line_is_the_one_that_is_told);
     RUN_TEST(test_random_lines_are_taken_whole_or_change_nothing);
     return UNITY_END();

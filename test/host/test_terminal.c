@@ -138,7 +138,7 @@ static void test_errors_are_answered_by_number_words_and_range(void)
     } rows[] = {{"k", "?1 unknown command"},      {"m200k", "?2 syntax"},
                 {"vc", "?3 number missing"},      {"m4294967296", "?4 number too large"},
                 {"vc1", "?7 too fast"},           {"v0", "?8 velocity 0"},
-                {"m", "?9 not available"},        {"m5u256", "?12 range 0..255"},
+                {"m0x", "?2 syntax"},             {"m5u256", "?12 range 0..255"},
                 {"a1000", "?12 range 0.01..999"}, {"85m200", "?9 not available"}};
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         char text[40], expected[80];
@@ -221,7 +221,7 @@ static void test_a_line_typed_during_a_display_is_executed_at_once_and_answered_
     for (int i = 0; i < 50; i++) {
         terminal_poll();
     }
-    terminal_port_fake_type("S\rxyz\rm12");
+    terminal_port_fake_type("S\r8xyz\rm12");
     for (int i = 0; i < 20; i++) {
         terminal_poll(); /* the line is stopped */
     }

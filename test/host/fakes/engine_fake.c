@@ -59,6 +59,11 @@ void engine_offer(const motion_command_t *command)
     }
 }
 
+void engine_release(void)
+{
+    engine_fake.releases++;
+}
+
 uint8_t engine_commands_begun(void)
 {
     return engine_fake.begun;

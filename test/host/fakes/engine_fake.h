@@ -22,6 +22,7 @@ typedef struct {
     /* what was asked */
     const motion_command_t *offered; /* and not begun */
     uint8_t begun;
+    unsigned releases;
     motion_command_t submitted[ENGINE_FAKE_COMMANDS];
     unsigned submitted_count;
     unsigned stops, nexts, nexts_graceful, stops_graceful;
