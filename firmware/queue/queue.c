@@ -60,18 +60,23 @@ bool queue_poll(void)
     return true;
 }
 
-NOINLINE void queue_stop(void)
+/* The engine has dropped what it had. */
+static NOINLINE void forget(void)
 {
     pending = 0;
-    engine_stop();
     submitted = engine_commands_ended();
+}
+
+NOINLINE void queue_stop(void)
+{
+    engine_stop();
+    forget();
 }
 
 void queue_stop_graceful(accel_code_t decel, bool linear)
 {
-    pending = 0;
     engine_stop_graceful(decel, linear);
-    submitted = engine_commands_ended();
+    forget();
 }
 
 void queue_next(void)
