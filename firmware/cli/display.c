@@ -122,7 +122,7 @@ static void put_accel(accel_code_t code)
 }
 
 /* At most 21 characters. */
-static NOINLINE void print_field(uint8_t field, const motion_command_t *command)
+static void print_field(uint8_t field, const motion_command_t *command)
 {
     uint32_t number, second;
     switch (field) {
