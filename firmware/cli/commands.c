@@ -382,22 +382,29 @@ const char commands_help[] FLASH =
 #undef COMMAND
     ;
 
+/* 0 if this is the letter; in either case unless the row is EXACT. */
+static inline uint8_t differs(uint8_t letter, char typed, uint8_t first)
+{
+    letter ^= (uint8_t)typed;
+    if (!(first & CASE_EXACT)) {
+        letter &= (uint8_t)~0x20;
+    }
+    return letter;
+}
+
 static status_t dispatch(const char *line)
 {
-    const uint8_t typed = (uint8_t)line[0];
     status_t status = STATUS_UNKNOWN_COMMAND;
     for (const command_row_t *row = rows; row < rows + ROWS; row++) {
         const uint8_t first = flash_u8(&row->first);
-        const uint8_t differ = first & CASE_EXACT ? UINT8_MAX : (uint8_t)~0x20; /* bits in which no letter may differ */
-        if ((typed ^ (first & LETTER)) & differ) {
+        const char *rest = line;
+        if (differs(first & LETTER, *rest++, first)) {
             continue;
         }
-        const char *rest = line + 1;
         const uint8_t second = flash_u8(&row->second);
-        if (second & LETTER) {
-            if (((uint8_t)*rest++ ^ (second & LETTER)) & differ) {
-                continue;
-            }
+        const uint8_t letter = second & LETTER;
+        if (letter != 0 && differs(letter, *rest++, first)) {
+            continue;
         }
         status = STATUS_SYNTAX;
         if (second >= ARGUMENT_REST || !more(*rest)) {

@@ -12,15 +12,17 @@
 static struct {
     const char *text;      /* in flash: what is still to come of the present text; 0: nothing is printed */
     uint8_t ruled;         /* how many signs of a rule have been printed */
-    uint8_t row;           /* of the queue; then what follows its rows */
+    uint8_t row;           /* of the queue */
     uint8_t current;       /* display_t */
     uint8_t waiting_count; /* how many wait behind it */
     uint8_t waiting[DISPLAY_WAITING];
-    session_t session; /* what `cf` shows: as it was when the display began, and whether GAP testing was on */
+    session_t session; /* what `cf` shows: as it was when the display began, and whether GAP testing
+                        * and debug mode were on */
 } shown;
 
 #define SHOWN_GAP (1u << 5)
-_Static_assert((SHOWN_GAP & SESSION_FLAGS) == 0, "a flag of its own");
+#define SHOWN_DEBUG MOTION_SYNC
+_Static_assert(((SHOWN_GAP | SHOWN_DEBUG) & SESSION_FLAGS) == 0, "flags that no session has");
 
 /* -- the texts -------------------------------------------------------------------------------------------------------- */
 
@@ -66,25 +68,29 @@ enum {
 #define LINEAR "\xC4"
 #define SYNC "\xC8"
 #define GAP "\xE0"
+#define DEBUG SYNC
 enum { CHOICE_ELSE = 0xA0, CHOICE_END = 0xA1, CHOICE_BEGIN = 0xC0 };
 _Static_assert(MOTION_CCW == 0x01 && MOTION_PULSES == 0x02 && MOTION_LINEAR == 0x04 && MOTION_SYNC == 0x08 &&
                    SHOWN_GAP == 0x20,
                "the flags stand in the characters");
+
+/* Where a row ends; next_row() says how it goes on. */
+#define NEXT_ROW "\xA2"
+enum { TEXT_NEXT_ROW = 0xA2 };
 
 /* A rule of 70 signs of equality. */
 #define RULE "=\r\n"
 enum { RULE_CHARACTERS = 70 };
 
 /* The queue: template of annex E, tab stops of 8. */
-static const char queue_text[] FLASH = "Q\tSteps\t\tRPM\tCycle\t Acc\tDec\tusteps\t deltaT\r\n" RULE;
+#define QUEUE_HEAD "Q\tSteps\t\tRPM\tCycle\t Acc\tDec\tusteps\t deltaT\r\n" RULE NEXT_ROW
 /* clang-format off */
-static const char queue_row_text[] FLASH =
+static const char queue_text[] FLASH = QUEUE_HEAD
     ROW "\t" COUNT "\t" CHOICE(PULSES, "+", " ") CHOICE(CCW, "CCW", "CW") "\t" RPM "\t" CYCLE
-    "\t" CHOICE(LINEAR, "*", " ") ACCEL "\t" DECEL "\t" EXTRA "\t" CHOICE(SYNC, "s", " ") " " WAIT "\r\n";
+    "\t" CHOICE(LINEAR, "*", " ") ACCEL "\t" DECEL "\t" EXTRA "\t" CHOICE(SYNC, "s", " ") " " WAIT "\r\n" NEXT_ROW
+    RULE "Q is at " NEXT "\t+ pulse\t\t\t* linear\t\ts sync\r\n"
+    CHOICE(DEBUG, "executing " EXECUTING "\r\n", "");
 /* clang-format on */
-static const char queue_end_text[] FLASH = RULE "Q is at " NEXT "\t+ pulse\t\t\t* linear\t\ts sync\r\n";
-static const char queue_executing_text[] FLASH = "executing " EXECUTING "\r\n";
-
 /* What EnF and the last line stand for is not built yet; they read as they will at its factory values. */
 /* clang-format off */
 static const char defaults_text[] FLASH =
@@ -94,7 +100,7 @@ static const char defaults_text[] FLASH =
     "ops 36, soft_ops off, CRC 1, ACK on\r\n";
 /* clang-format on */
 
-static const char array_text[] FLASH = "x_ " ROW " " ENTRY "\r\n";
+static const char array_text[] FLASH = "x_ " ROW " " ENTRY "\r\n" NEXT_ROW;
 static const char velocity_text[] FLASH = VELOCITY "\r\n";
 static const char position_text[] FLASH = "position " POSITION " " STATE " faults " FAULTS "\r\n";
 
@@ -120,7 +126,7 @@ static void put_accel(accel_code_t code)
 }
 
 /* At most 21 characters. */
-static NOINLINE void print_field(uint8_t field, const motion_command_t *command)
+static void print_field(uint8_t field, const motion_command_t *command)
 {
     uint32_t number, second;
     switch (field) {
@@ -158,45 +164,55 @@ static void begin(uint8_t display)
 {
     shown.current = display;
     if (display > DISPLAY_ROW) {
-        shown.current = DISPLAY_ROW;
         shown.row = (uint8_t)(display - DISPLAY_ROW);
-        shown.text = queue_row_text;
+        shown.text = queue_text + sizeof QUEUE_HEAD - 1;
         return;
     }
     shown.text = flash_pointer(&texts[display]);
-    shown.row = display == DISPLAY_QUEUE && commands_debugging() ? UINT8_MAX : 0; /* to show position 0 as well */
+    shown.row = 0;
     shown.session = session;
+    uint8_t flags = session.flags;
     if (engine_gap()) {
-        shown.session.flags |= SHOWN_GAP;
+        flags |= SHOWN_GAP;
     }
+    if (commands_debugging()) {
+        flags |= SHOWN_DEBUG;
+        if (display == DISPLAY_QUEUE) {
+            shown.row = UINT8_MAX; /* positions 0 and 31 are shown in debug mode only */
+        }
+    }
+    shown.session.flags = flags;
 }
 
-/* The text is through: what follows it. */
-static void next_text(void)
+/* The display is through: the next one. */
+static void next_display(void)
 {
-    const char *text = 0;
-    const uint8_t before = shown.row++;
-    const uint8_t row = shown.row;
-    if (shown.current == DISPLAY_QUEUE) {
-        if (row <= QUEUE_LAST || (row == QUEUE_ONE_SHOT && commands_debugging())) {
-            text = queue_row_text;
-        } else if (row <= QUEUE_ONE_SHOT + 1) {
-            text = queue_end_text;
-            shown.row = QUEUE_ONE_SHOT + 1;
-        } else if (row == QUEUE_ONE_SHOT + 2 && commands_debugging()) {
-            text = queue_executing_text;
-        }
-    } else if (shown.current == DISPLAY_ARRAY && row < QUEUE_ARRAY && queue_array(before) != 0) {
-        text = array_text;
-    }
-    shown.text = text;
-    if (text == 0 && shown.waiting_count > 0) {
+    shown.text = 0;
+    if (shown.waiting_count > 0) {
         begin(shown.waiting[0]);
         shown.waiting_count--;
         for (uint8_t i = 0; i < DISPLAY_WAITING - 1; i++) {
             shown.waiting[i] = shown.waiting[i + 1];
         }
     }
+}
+
+static uint8_t last_row(void)
+{
+    return shown.session.flags & SHOWN_DEBUG ? QUEUE_ONE_SHOT : QUEUE_LAST;
+}
+
+/* How it goes on behind a row. */
+static const char *next_row(const char *behind_it)
+{
+    const uint8_t before = shown.row++;
+    if (shown.current == DISPLAY_QUEUE) {
+        return shown.row <= last_row() ? queue_text + sizeof QUEUE_HEAD - 1 : behind_it;
+    }
+    if (shown.current == DISPLAY_ARRAY && before < QUEUE_ARRAY - 1 && queue_array(before) != 0) {
+        return array_text;
+    }
+    return array_text + sizeof array_text - 1; /* nothing */
 }
 
 static NOINLINE const char *behind(const char *text, uint8_t mark)
@@ -212,14 +228,14 @@ static NOINLINE void print_piece(void)
     motion_command_t defaults; /* or a row of the queue: the command whose values are shown */
     const motion_command_t *command = &defaults;
     session_template(&shown.session, &defaults);
-    if ((shown.current == DISPLAY_QUEUE || shown.current == DISPLAY_ROW) && shown.row < QUEUE_POSITIONS) {
+    if (shown.current > DISPLAY_ROW || (shown.current == DISPLAY_QUEUE && shown.row <= last_row())) {
         command = queue_entry(shown.row);
     }
     const char *text = shown.text;
     for (uint8_t room = TEXT_PIECE_BYTES; room > 0; room--) {
         const uint8_t character = flash_u8(text);
         if (character == '\0') {
-            next_text();
+            next_display();
             return;
         }
         if (character >= FIELD_COUNT && character < CHOICE_ELSE) {
@@ -228,6 +244,10 @@ static NOINLINE void print_piece(void)
                 print_field(character, command);
                 return;
             }
+            break;
+        }
+        if (character == TEXT_NEXT_ROW) {
+            text = next_row(text + 1);
             break;
         }
         if (character != '=' || ++shown.ruled == RULE_CHARACTERS) {

@@ -26,6 +26,7 @@ static line_event_t append(line_t *line, char character)
 
 line_event_t line_take(line_t *line, uint8_t byte)
 {
+    NEAR(line);
     const uint8_t last = line->last;
     line->last = byte;
 
