@@ -323,7 +323,7 @@ const char *image_ask(const char *line)
     for (;;) {
         image_run(20 * LOOK);
         const char *seen = board_uart_text(board);
-        if (!board_uart_sending(board) && strlen(seen) > echo && ends_with(seen, "\nSAC>"))
+        if (!board_uart_sending(board) && strlen(seen) > echo && (ends_with(seen, "\nSAC>") || ends_with(seen, "\nQ>") || ends_with(seen, "\nX>")))
             break;
         if (board_cycle(board) > end)
             image_fail("\"%s\": expected a prompt by cycle %" PRIu64 ", saw \"%s\"", line, end, seen);
@@ -332,7 +332,8 @@ const char *image_ask(const char *line)
     size_t length = strlen(text);
     if (strncmp(text, line, echo) != 0 || strncmp(text + echo, "\r\n", 2) != 0)
         image_fail("expected the echo \"%s\\r\\n\", saw \"%s\"", line, text);
-    text[length - strlen("SAC>")] = '\0';
+    text[length] = '\0';
+    *(strrchr(text, '\n') + 1) = '\0'; /* the prompt */
     return text + echo + 2;
 }
 
