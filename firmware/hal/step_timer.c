@@ -205,19 +205,6 @@ bool step_port_extend(uint8_t offset)
     return done;
 }
 
-bool step_port_drop_after(uint8_t offset)
-{
-    uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
-    bool done = false;
-    uint8_t state = atomic_begin();
-    if ((uint8_t)(after - step_tail) <= (uint8_t)(step_head - step_tail)) {
-        step_head = after;
-        done = true;
-    }
-    atomic_end(state);
-    return done;
-}
-
 uint16_t step_port_shorten(uint8_t offset, uint16_t periods)
 {
     segment_t *s = segment_at(offset);

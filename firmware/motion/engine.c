@@ -10,6 +10,8 @@
 #include "settings.h"
 
 #define TICKS_PER_US 16u
+#define PROFILE_CHUNK_US_LOG2 (PROFILE_CHUNK_LOG2 - 4)
+#define PROFILE_CHUNK_US (1u << PROFILE_CHUNK_US_LOG2)
 #define DIR_SETUP_TICKS 80u      /* dir before the first pulse: 5 us, the slowest common drivers ask for it */
 #define TURN_TICKS (DIR_SETUP_TICKS + 100u) /* the same where the step interrupt sets dir: its latency and cycles */
 #define TAIL_TICKS 320u          /* the end of the closing interval, on which a following command is joined */
@@ -63,12 +65,11 @@ static bool dir_due;             /* the next single period sets the dir pin */
 static uint32_t closing_chunks;  /* closing interval of the last command emitted: so many PROFILE_CHUNK_TICKS ... */
 static uint16_t closing_ticks;   /* ... and these */
 static uint8_t tail_offset;      /* its tail segment, while stage is REST, GAP or END */
-static bool tail_valid;          /* a command can still be joined to it */
-static bool tail_awaited;        /* it has not begun yet: its command has not ended */
+static bool tail_awaited;        /* it has not begun: its command has not ended, and another one can be joined to it */
 static bool joined;              /* the ring holds the end of one command and the beginning of the next one ... */
 static uint8_t joined_offset;    /* ... which begins at the end of this segment */
+static uint16_t tail_ticks;
 static bool tail_fast;           /* too fast for a tail: a following command lengthens the last run instead */
-static uint8_t last_run_offset;
 
 static int32_t emitted; /* position, in pulses, when all that is in the ring has been played */
 static uint8_t ended;
@@ -112,28 +113,29 @@ void engine_init(void)
 
 /* -- the ring -------------------------------------------------------------------------------------------------- */
 
-static NOINLINE uint8_t early_periods(uint8_t flags)
+/* So many periods before its end such a segment's reload is begun. */
+static uint8_t early_periods(const segment_t *s)
 {
-    return (uint8_t)((flags & SEGMENT_EARLY_MASK) >> SEGMENT_EARLY_SHIFT);
+    return (uint8_t)((s->flags & SEGMENT_EARLY_MASK) >> SEGMENT_EARLY_SHIFT);
 }
 
-/* Which reload a period of top + 1 ticks needs. */
-static NOINLINE uint8_t early_flags(uint16_t top)
+/* The same for periods of top + 1 ticks. */
+static NOINLINE uint8_t early_of(uint16_t top)
 {
-    uint8_t periods = (uint8_t)((top < SEGMENT_EARLY1_BELOW_TICKS - 1) + (top < SEGMENT_EARLY2_BELOW_TICKS - 1) +
-                                (top < SEGMENT_EARLY3_BELOW_TICKS - 1));
-    return (uint8_t)(periods << SEGMENT_EARLY_SHIFT);
+    return (uint8_t)((top < SEGMENT_EARLY1_BELOW_TICKS - 1) + (top < SEGMENT_EARLY2_BELOW_TICKS - 1) +
+                     (top < SEGMENT_EARLY3_BELOW_TICKS - 1));
 }
 
 /* Periods that the interrupt counts: those waited for early are not among them. */
 static uint16_t counted_periods(const segment_t *s)
 {
-    return (uint16_t)((uint16_t)(s->count_high << 8) + (s->count_low ? s->count_low : 256u));
+    return (uint16_t)((uint16_t)(s->count_high << 8 | (uint8_t)(s->count_low - 1)) + 1);
 }
 
-static uint32_t period_ticks(const segment_t *s)
+/* Of so many of its periods. */
+static NOINLINE uint32_t ticks_of(const segment_t *s, uint16_t periods)
 {
-    return s->top + (uint32_t)1;
+    return (uint32_t)s->top * periods + periods;
 }
 
 static bool is_silent(const segment_t *s)
@@ -154,10 +156,14 @@ static uint32_t profile_pulses_left(void)
     return profile.accel_pulses + profile.cruise_pulses + profile.decel_pulses;
 }
 
-static uint8_t pulses_to_come(void)
+/* Those of them that come after the next `planned` ones and may be repeated if the ring runs empty. */
+static NOINLINE uint8_t pulses_to_come(uint16_t planned)
 {
     uint32_t left = profile_pulses_left();
-    return left > 255 ? 254 : left ? (uint8_t)(left - 1) : 0;
+    if (left <= planned)
+        return 0;
+    left -= planned;
+    return left > 255 ? 254 : (uint8_t)(left - 1);
 }
 
 static void add_pulses(uint8_t flags, uint16_t pulses)
@@ -186,35 +192,27 @@ static void look_for_end(void)
     }
 }
 
-static NOINLINE uint16_t give(uint32_t *phase, uint16_t pulses)
+static NOINLINE uint8_t give(uint32_t *phase, uint8_t pulses)
 {
-    uint16_t some = *phase < pulses ? (uint16_t)*phase : pulses;
+    uint8_t some = *phase < pulses ? (uint8_t)*phase : pulses;
     *phase -= some;
-    return (uint16_t)(pulses - some);
+    return (uint8_t)(pulses - some);
 }
 
-/* The interrupt has repeated the last interval because the ring was empty: so many pulses fewer are to be made. Returns
- * how many of them the phases to come could not give. */
-static uint16_t absorb_held(void)
+/* The interrupt has repeated the last interval because the ring was empty: so many pulses fewer are to be made. */
+static NOINLINE void absorb_held(void)
 {
     uint8_t lock = atomic_begin();
-    uint16_t held = step_held;
+    uint8_t held = step_held;
     step_held = 0;
     atomic_end(lock);
-    if (held == 0)
-        return 0;
     faults |= ENGINE_FAULT_STARVED;
     add_pulses(step_flags, held);
     /* The cruise becomes shorter, or, where there is none, the ramps; the closing interval stays. */
     uint32_t left = profile_pulses_left();
-    if (left == 0)
-        return held;
-    uint16_t given = left > held ? held : (uint16_t)(left - 1);
-    held = (uint16_t)(held - given);
-    given = give(&profile.cruise_pulses, given);
-    given = give(&profile.accel_pulses, given);
-    give(&profile.decel_pulses, given);
-    return held;
+    uint8_t given = left > held ? held : left ? (uint8_t)(left - 1) : 0;
+    owed = (uint16_t)(owed + held - given);
+    give(&profile.decel_pulses, give(&profile.accel_pulses, give(&profile.cruise_pulses, given)));
 }
 
 /* So many pulses may be repeated from now on if the ring runs empty. */
@@ -225,49 +223,56 @@ static void allow_hold(uint8_t pulses)
     atomic_end(lock);
 }
 
-/* Appends `periods` periods of `top` + 1 ticks. Runs too short to be reloaded in time (periods that need an early reload,
- * no more of them than are waited for) are stretched: their count stays exact. */
-static void push(uint16_t periods, uint16_t top, bool pulse, motion_state_t state)
+/* Before segments are appended: takes account of what has been played. True if held pulses were among it. */
+static NOINLINE bool settle(uint8_t hold)
+{
+    look_for_end();
+    allow_hold(hold); /* first, so that what is held from here on can be given back */
+    if (step_held == 0)
+        return false;
+    absorb_held();
+    return true;
+}
+
+/* Appends so many periods of the phase, of so many ticks (0: 65,536). Runs too short to be reloaded in time (periods that
+ * need an early reload, no more of them than are waited for) are stretched: their count stays exact. */
+static void push(uint16_t periods, uint16_t ticks, bool pulse)
 {
     segment_t *s = segment_at(step_head);
     bool turn = dir_due && periods == 1;
-    uint8_t flags = (uint8_t)(state | direction_flags(&command, turn));
+    uint8_t flags = (uint8_t)(ramp_state | direction_flags(&command, turn));
     dir_due = dir_due && !turn;
-    look_for_end();
-    allow_hold(pulse ? pulses_to_come() : 0); /* first, so that what is held from here on can be given back */
-    if (step_held)
-        owed = (uint16_t)(owed + absorb_held());
+    settle(pulse ? pulses_to_come(0) : 0);
     if (pulse) {
         uint16_t given = owed < periods ? owed : periods;
         owed = (uint16_t)(owed - given);
         periods = (uint16_t)(periods - given);
         add_pulses(flags, periods);
     }
-    uint8_t early = early_flags(top);
-    uint16_t counted = periods;
-    if (periods > early_periods(early)) {
-        flags |= early;
-        counted = (uint16_t)(periods - early_periods(early));
-    } else if (early) {
+    if (periods == 0)
+        return;
+    uint16_t top = (uint16_t)(ticks - 1);
+    uint8_t early = early_of(top);
+    if (periods > early) {
+        flags = (uint8_t)(flags | early << SEGMENT_EARLY_SHIFT);
+        periods = (uint16_t)(periods - early);
+    } else {
         top = SEGMENT_EARLY1_BELOW_TICKS - 1;
     }
     s->top = top;
     s->match = pulse ? (uint16_t)(top - width_ticks) : SEGMENT_SILENT;
-    s->count_low = (uint8_t)counted;
-    s->count_high = (uint8_t)((uint16_t)(counted - 1) >> 8);
+    s->count_low = (uint8_t)periods;
+    s->count_high = (uint8_t)((uint16_t)(periods - 1) >> 8);
     s->flags = flags;
-    if (periods)
-        step_head = (uint8_t)(step_head + SEGMENT_BYTES);
+    step_head = (uint8_t)(step_head + SEGMENT_BYTES);
 }
 
 /* The interval that ends with the pulse of the segment at `offset`: its period and the silence before it. */
 static uint32_t interval_at(uint8_t offset)
 {
-    uint32_t ticks = period_ticks(segment_at(offset));
     const segment_t *before = segment_at((uint8_t)(offset - SEGMENT_BYTES));
-    if (is_silent(before))
-        ticks += period_ticks(before) * counted_periods(before);
-    return ticks;
+    uint32_t ticks = is_silent(before) ? ticks_of(before, counted_periods(before)) : 0;
+    return ticks + ticks_of(segment_at(offset), 1);
 }
 
 /* Ticks from the segment at `offset`, which has so many periods left, to the one at `end`, or more than
@@ -276,8 +281,7 @@ static uint32_t ticks_between(uint8_t offset, uint16_t periods, uint8_t end)
 {
     uint32_t ticks = 0;
     while (offset != end && ticks <= JOIN_SOON_TICKS) {
-        const segment_t *s = segment_at(offset);
-        ticks += period_ticks(s) * periods;
+        ticks += ticks_of(segment_at(offset), periods);
         offset = (uint8_t)(offset + SEGMENT_BYTES);
         periods = counted_periods(segment_at(offset));
     }
@@ -297,7 +301,7 @@ static int32_t pulses_from(uint8_t offset)
     int32_t pulses = 0;
     while (offset != step_head) {
         const segment_t *s = segment_at(offset);
-        pulses += signed_pulses(s, (uint16_t)(counted_periods(s) + early_periods(s->flags)));
+        pulses += signed_pulses(s, (uint16_t)(counted_periods(s) + early_periods(s)));
         offset = (uint8_t)(offset + SEGMENT_BYTES);
     }
     return pulses;
@@ -316,7 +320,7 @@ int32_t engine_position(void)
         running = segment_at((uint8_t)(loaded_offset - SEGMENT_BYTES));
     int32_t to_come = pulses_from(at.tail);
     if (!step_idle)
-        to_come += signed_pulses(loaded, (uint16_t)(at.to_count + early_periods(loaded->flags)));
+        to_come += signed_pulses(loaded, (uint16_t)(at.to_count + early_periods(loaded)));
     if (!at.pulse_high && !at.period_over && !step_idle)
         to_come += signed_pulses(running, 1);
     return emitted - to_come;
@@ -324,27 +328,21 @@ int32_t engine_position(void)
 
 /* -- emission -------------------------------------------------------------------------------------------------- */
 
-/* Sets up an interval that ends with a pulse (or not); emit() turns it into segments. */
-static void set_interval(uint32_t chunks, uint32_t ticks, bool pulse)
+/* Sets up an interval of so many chunks and ticks (which may be negative) that ends with a pulse (or not); emit() turns it
+ * into segments. */
+static void set_interval(uint32_t chunks, int32_t ticks, bool pulse)
 {
-    if (ahead_ticks) {
-        while (ticks < ahead_ticks + SHORTEST_PIECE_TICKS) {
-            ticks += PROFILE_CHUNK_TICKS;
-            chunks--;
-        }
-        ticks -= ahead_ticks;
-        ahead_ticks = 0;
-    }
-    if (chunks && ticks < SHORTEST_PIECE_TICKS) {
-        ticks += PROFILE_CHUNK_TICKS;
+    ticks -= ahead_ticks;
+    ahead_ticks = 0;
+    chunks += (uint32_t)(ticks >> PROFILE_CHUNK_LOG2);
+    uint16_t piece = (uint16_t)((uint16_t)ticks % PROFILE_CHUNK_TICKS);
+    /* No piece too short, and what fits a period is one. */
+    while (chunks && (piece < SHORTEST_PIECE_TICKS || (chunks == 1 && piece < PROFILE_CHUNK_TICKS))) {
+        piece = (uint16_t)(piece + PROFILE_CHUNK_TICKS);
         chunks--;
     }
-    if (chunks == 1 && ticks < PROFILE_CHUNK_TICKS) {
-        ticks += PROFILE_CHUNK_TICKS;
-        chunks = 0;
-    }
     silence_chunks = chunks;
-    piece_ticks = (uint16_t)ticks; /* below 65536 */
+    piece_ticks = piece;
     piece_pulse = pulse;
 }
 
@@ -356,27 +354,8 @@ static NOINLINE uint32_t take_carry(uint32_t ticks, uint16_t frac_q16)
     return (uint32_t)((int32_t)ticks + (carry >> 16));
 }
 
-/* `pulses` intervals, `longer` of them of ticks + 1, the others of ticks. Too few of either kind for an early reload are
- * made like the others, and the difference is carried. */
-static void push_run(uint16_t pulses, uint16_t longer, uint16_t ticks, bool faster, motion_state_t state)
-{
-    uint8_t early = early_periods(early_flags((uint16_t)(ticks - 1)));
-    uint16_t ideal = longer;
-    if (longer <= early)
-        longer = 0;
-    else if (pulses - longer <= early)
-        longer = pulses;
-    carry_q16 += (int32_t)(int16_t)(ideal - longer) * 65536;
-    if (faster && longer)
-        push(longer, ticks, true, state);
-    if (pulses != longer)
-        push((uint16_t)(pulses - longer), (uint16_t)(ticks - 1), true, state);
-    if (!faster && longer)
-        push(longer, ticks, true, state);
-}
-
 /* push() without its cases: pulses of at least SEGMENT_EARLY1_BELOW_TICKS, many more to come. */
-static inline void append(uint16_t periods, uint16_t top, uint16_t width, uint8_t flags)
+static void append(uint16_t periods, uint16_t top, uint16_t width, uint8_t flags)
 {
     segment_t *s = segment_at(step_head);
     s->top = top;
@@ -385,6 +364,13 @@ static inline void append(uint16_t periods, uint16_t top, uint16_t width, uint8_
     s->count_high = 0;
     s->flags = flags;
     step_head = (uint8_t)(step_head + SEGMENT_BYTES);
+}
+
+/* One pulse. */
+static void append_pulse(uint16_t ticks, uint8_t flags)
+{
+    append(1, (uint16_t)(ticks - 1), width_ticks, flags);
+    add_pulses(flags, 1);
 }
 
 static void append_silence(uint16_t periods, uint16_t top, uint8_t flags)
@@ -403,55 +389,75 @@ static void begin_ramp(motion_state_t state)
         profile_begin_decel(&profile, &basis, &ramp);
 }
 
-/* `pulses` intervals of a ramp that last `ticks` together. */
-static void emit_flat(uint16_t pulses, uint32_t ticks, motion_state_t state, bool faster)
+/* Does the phase have its longer intervals first? */
+static bool speeds_up(void)
+{
+    return ramp_state == MOTION_ACCEL && profile.faster;
+}
+
+/* `pulses` intervals of the phase that last `ticks` together: of two neighbouring values. Too few of either kind for an
+ * early reload are made like the others, and the difference is carried. */
+static void emit_flat(uint16_t pulses, uint32_t ticks)
 {
     if (pulses == 1) {
         if (ticks > 65535u || ahead_ticks)
-            set_interval(ticks >> PROFILE_CHUNK_LOG2, ticks & (PROFILE_CHUNK_TICKS - 1), true);
+            set_interval(0, (int32_t)ticks, true);
         else
-            push(1, (uint16_t)(ticks - 1), true, state);
+            push(1, (uint16_t)ticks, true);
         return;
     }
-    uint32_t each = ticks / pulses;
-    push_run(pulses, (uint16_t)((uint16_t)ticks - (uint16_t)each * pulses), (uint16_t)each, faster, state);
+    uint16_t each = (uint16_t)(ticks / pulses);
+    uint16_t longer = (uint16_t)((uint16_t)ticks - each * pulses);
+    uint16_t ideal = longer;
+    uint8_t early = early_of((uint16_t)(each - 1));
+    if (longer <= early)
+        longer = 0;
+    else if (pulses - longer <= early)
+        longer = pulses;
+    carry_q16 += (int32_t)(int16_t)(ideal - longer) * 65536;
+    bool first = ramp_state == MOTION_CRUISE || speeds_up();
+    if (first && longer)
+        push(longer, (uint16_t)(each + 1), true);
+    if (pulses != longer)
+        push((uint16_t)(pulses - longer), each, true);
+    if (!first && longer)
+        push(longer, (uint16_t)(each + 1), true);
+}
+
+/* The phase's pulses that may be emitted: the last one of all has the closing interval. */
+static NOINLINE uint32_t pulses_of_phase(void)
+{
+    uint32_t most = profile_pulses_left() - 1;
+    return *phase_left < most ? *phase_left : most;
 }
 
 /* Appends what the ring has room for of the block. */
 static void emit_block(void)
 {
-    uint32_t *left = phase_left;
-    look_for_end();
     uint8_t pulses = block.pulses;
     uint8_t runs = block.runs;
-    uint32_t spare = profile_pulses_left() - 1; /* the closing interval has one */
     uint16_t planned = (uint16_t)(runs * pulses);
-    /* First, so that what is held from here on can be given back. */
-    allow_hold(spare < planned ? 0 : spare - planned > 254 ? 254 : (uint8_t)(spare - planned));
-    if (step_held) {
-        owed = (uint16_t)(owed + absorb_held());
-        spare = profile_pulses_left() - 1;
+    if (settle(pulses_to_come(planned))) {
+        uint32_t most = pulses_of_phase();
+        if (most < planned) /* held pulses have been taken from it */
+            block.runs = runs = (uint8_t)((uint16_t)most / pulses);
     }
-    if (spare > *left)
-        spare = *left;
-    if (spare < planned) /* held pulses have been taken from it */
-        block.runs = runs = (uint8_t)(spare / pulses);
     block_append(&block);
     uint16_t made = (uint16_t)((uint8_t)(runs - block.runs) * pulses);
-    *left -= made;
+    *phase_left -= made;
     add_pulses(block.flags, made);
     if (block.runs == 0)
         carry_q16 += (int32_t)(block.shape & BLOCK_SPLIT ? block.carry_q16 : (uint32_t)block.carry_q16 * pulses);
 }
 
 /* What the block's runs do not say: the ticks carried so far, their segments' flags. */
-static void begin_block(bool faster)
+static void begin_block(void)
 {
     bool split = block.top_q16 >> 16 >= BLOCK_SPLIT_TICKS - 1;
-    block.shape = (uint8_t)((faster ? BLOCK_FASTER : 0) | (split ? BLOCK_SPLIT : 0));
-    block.carry_q16 = 0;
+    block.shape = (uint8_t)((speeds_up() ? BLOCK_FASTER : 0) | (split ? BLOCK_SPLIT : 0));
+    uint32_t carry = 0;
     if (carry_q16 > 0) { /* otherwise it waits for a single interval */
-        uint32_t carry = (uint32_t)carry_q16;
+        carry = (uint32_t)carry_q16;
         carry_q16 = 0;
         if (!split || carry > UINT16_MAX) {
             carry /= block.pulses; /* of each interval */
@@ -460,14 +466,14 @@ static void begin_block(bool faster)
                 carry = 0;
             }
         }
-        block.carry_q16 = (uint16_t)carry;
     }
+    block.carry_q16 = (uint16_t)carry;
     block.width_ticks = width_ticks;
     block.flags = (uint8_t)(ramp_state | direction_flags(&command, false));
 }
 
 /* The next intervals of the ramp of `ramp_state`: pulses all alike, a block, or some of the former before a block. */
-static void emit_ramp(uint32_t at_most, bool faster)
+static void emit_ramp(uint32_t at_most)
 {
     if (ahead_ticks || dir_due || owed)
         at_most = 1;
@@ -477,7 +483,7 @@ static void emit_ramp(uint32_t at_most, bool faster)
         ramp_time_t sum;
         uint16_t group = ramp_next(&ramp, &basis.ramp, at_most, &sum, &block);
         if (block.runs) {
-            begin_block(faster);
+            begin_block();
             break;
         }
         ticks += take_carry(sum.ticks, sum.frac_q16);
@@ -486,7 +492,7 @@ static void emit_ramp(uint32_t at_most, bool faster)
     } while (ramp.rest && at_most);
     *phase_left -= pulses;
     if (pulses)
-        emit_flat(pulses, ticks, ramp_state, faster);
+        emit_flat(pulses, ticks);
 }
 
 static void emit_cruise(uint32_t at_most)
@@ -501,78 +507,66 @@ static void emit_cruise(uint32_t at_most)
     }
     if (chunks || ahead_ticks) {
         (*phase_left)--;
-        ticks = take_carry(ticks, (uint16_t)(frac << 8));
-        set_interval(chunks, ticks, true);
+        set_interval(chunks, (int32_t)take_carry(ticks, (uint16_t)(frac << 8)), true);
         return;
     }
     uint16_t run = at_most > RUN_MAX_PERIODS ? RUN_MAX_PERIODS : (uint16_t)at_most;
     if (frac == 0 || run < 8) {
         *phase_left -= run;
         uint32_t fraction = (uint32_t)frac * run;
-        emit_flat(run, take_carry(ticks * run + (fraction >> 8), (uint16_t)(fraction << 8)), MOTION_CRUISE, true);
+        emit_flat(run, take_carry(ticks * run + (fraction >> 8), (uint16_t)(fraction << 8)));
         return;
     }
     /* Runs of two neighbouring values. */
-    uint8_t run_log2 = 3;
-    while (run_log2 < 7 && ticks << run_log2 < CRUISE_GROUP_TICKS && run >> run_log2 > 1)
-        run_log2++;
-    run = (uint16_t)(run >> run_log2);
+    uint8_t pulses = 8;
+    run /= 8;
+    for (uint16_t least = CRUISE_GROUP_TICKS / 8; pulses < 128 && ticks < least && run > 1; least /= 2) {
+        pulses = (uint8_t)(pulses * 2);
+        run /= 2;
+    }
     block.runs = (uint8_t)(run > 255u ? 255u : run);
-    block.pulses = (uint8_t)(1u << run_log2);
+    block.pulses = pulses;
     block.top_q16 = ((ticks - 1) << 16) | (uint32_t)frac << 8;
     block.slope_q16 = 0;
     block.curve_q16 = 0;
-    begin_block(false);
+    begin_block();
 }
 
-/* The interval after the last pulse of the command: body, then tail. */
+/* The interval after the last pulse of the command, which is of this phase: body, then tail. */
 static void begin_closing(void)
 {
     profile_t *p = &profile;
+    ramp_time_t last;
     uint32_t chunks = 0;
-    uint32_t ticks;
-    motion_state_t state = p->decel_pulses ? MOTION_DECEL : p->cruise_pulses ? MOTION_CRUISE : MOTION_ACCEL;
-    if (state == MOTION_CRUISE) {
+    if (ramp_state == MOTION_CRUISE) {
         chunks = p->cruise.chunks;
-        ticks = take_carry(p->cruise.ticks_q8 >> 8, (uint16_t)(p->cruise.ticks_q8 << 8));
+        last.ticks = p->cruise.ticks_q8 >> 8;
+        last.frac_q16 = (uint16_t)(p->cruise.ticks_q8 << 8);
     } else {
-        begin_ramp(state);
-        ramp_time_t sum;
-        (void)ramp_next(&ramp, &basis.ramp, 1, &sum, &block);
-        ticks = take_carry(sum.ticks, sum.frac_q16);
-        chunks = ticks >> PROFILE_CHUNK_LOG2;
-        ticks &= PROFILE_CHUNK_TICKS - 1;
+        (void)ramp_next(&ramp, &basis.ramp, 1, &last, &block);
     }
-    p->accel_pulses = p->cruise_pulses = p->decel_pulses = 0;
-    ramp_state = state; /* the body belongs to the phase */
+    uint32_t ticks = take_carry(last.ticks, last.frac_q16);
+    chunks += ticks >> PROFILE_CHUNK_LOG2;
+    ticks &= PROFILE_CHUNK_TICKS - 1;
+    *phase_left = 0;
     closing_chunks = chunks;
     closing_ticks = (uint16_t)ticks;
-    tail_fast = chunks == 0 && ticks < SEGMENT_EARLY1_BELOW_TICKS;
+    tail_ticks = TAIL_TICKS;
+    if (chunks || ticks >= 2 * TAIL_TICKS)
+        set_interval(chunks, (int32_t)(ticks - TAIL_TICKS), false);
+    else
+        tail_ticks = (uint16_t)ticks;
+    tail_fast = tail_ticks < SEGMENT_EARLY1_BELOW_TICKS;
+    if (tail_fast)
+        tail_ticks = SHORTEST_PIECE_TICKS;
     stage = STAGE_TAIL;
-    if (chunks || ticks >= 2 * TAIL_TICKS) {
-        if (ticks < 2 * TAIL_TICKS) {
-            ticks += PROFILE_CHUNK_TICKS;
-            chunks--;
-        }
-        ticks -= TAIL_TICKS;
-        set_interval(chunks, ticks, false);
-    }
 }
 
 static void push_tail(void)
 {
-    uint16_t ticks = TAIL_TICKS;
-    if (closing_chunks == 0 && closing_ticks < 2 * TAIL_TICKS) {
-        ticks = closing_ticks;
-        if (ahead_ticks)
-            ahead_ticks = 0;
-    }
-    if (tail_fast)
-        ticks = SHORTEST_PIECE_TICKS;
     tail_offset = step_head;
-    last_run_offset = (uint8_t)(step_head - SEGMENT_BYTES);
-    tail_valid = true;
-    push(1, (uint16_t)(ticks - 1), false, MOTION_STOP);
+    ramp_state = MOTION_STOP;
+    push(1, tail_ticks, false);
     tail_awaited = true;
 }
 
@@ -582,13 +576,13 @@ static bool emit_other(void)
     if (silence_chunks) {
         uint16_t periods = silence_chunks > RUN_MAX_PERIODS ? RUN_MAX_PERIODS : (uint16_t)silence_chunks;
         silence_chunks -= periods;
-        push(periods, PROFILE_CHUNK_TICKS - 1, false, ramp_state);
+        push(periods, PROFILE_CHUNK_TICKS, false);
         return true;
     }
     if (piece_ticks) {
         uint16_t ticks = piece_ticks;
         piece_ticks = 0;
-        push(1, (uint16_t)(ticks - 1), piece_pulse, ramp_state);
+        push(1, ticks, piece_pulse);
         return true;
     }
     profile_t *p = &profile;
@@ -598,60 +592,52 @@ static bool emit_other(void)
     case STAGE_LEAD: {
         /* The start wait, then the first pulse. */
         uint32_t us = command.start_wait_us;
-        uint32_t chunks = us >> (PROFILE_CHUNK_LOG2 - 4);
-        uint32_t ticks = (us & (PROFILE_CHUNK_TICKS / TICKS_PER_US - 1)) * TICKS_PER_US;
         ramp_state = MOTION_STANDBY;
-        set_interval(chunks, ticks, true);
+        set_interval(us >> PROFILE_CHUNK_US_LOG2, (int32_t)((uint16_t)us % PROFILE_CHUNK_US * TICKS_PER_US), true);
         stage = STAGE_RUN;
-        return true;
+        break;
     }
     case STAGE_RUN: {
-        uint32_t after = p->decel_pulses;
-        motion_state_t state = MOTION_DECEL;
-        phase_left = &p->decel_pulses;
-        if (p->accel_pulses) {
-            after += p->cruise_pulses;
-            phase_left = &p->accel_pulses;
-            state = MOTION_ACCEL;
-        } else if (p->cruise_pulses) {
-            phase_left = &p->cruise_pulses;
-            state = MOTION_CRUISE;
-        } else {
-            after = 0;
+        motion_state_t state = MOTION_ACCEL;
+        uint32_t *left = &p->accel_pulses;
+        while (*left == 0 && state != MOTION_DECEL) {
+            left++; /* cruise, deceleration */
+            state++;
         }
-        uint8_t kept = after == 0; /* for the closing interval */
-        uint32_t at_most = *phase_left - kept;
-        if (*phase_left <= kept) {
-            begin_closing();
-        } else if (state == MOTION_CRUISE) {
-            ramp_state = state;
-            emit_cruise(at_most);
-        } else {
+        phase_left = left;
+        uint32_t at_most = pulses_of_phase();
+        if (state == MOTION_CRUISE)
+            ramp_state = MOTION_CRUISE;
+        else
             begin_ramp(state);
-            emit_ramp(at_most, state == MOTION_ACCEL && p->faster);
-        }
-        return true;
+        if (at_most == 0)
+            begin_closing();
+        else if (state == MOTION_CRUISE)
+            emit_cruise(at_most);
+        else
+            emit_ramp(at_most);
+        break;
     }
     case STAGE_TAIL:
         push_tail();
         v_in_play = p->v_exit;
         in_play_cycle_us = p->exit_cycle_us;
         stage = STAGE_GAP;
-        return true;
+        break;
     case STAGE_GAP:
         if (next_taken)
             return false; /* it will be joined */
         ramp_state = MOTION_STANDBY;
         if (gap_on)
-            set_interval(closing_chunks, tail_fast ? SHORTEST_PIECE_TICKS : closing_ticks, false);
+            set_interval(closing_chunks, tail_fast ? tail_ticks : closing_ticks, false);
         stage = STAGE_END;
-        return true;
+        break;
     case STAGE_END:
-        push(1, SHORTEST_PIECE_TICKS - 1, false, MOTION_STANDBY);
+        push(1, SHORTEST_PIECE_TICKS, false);
         stage = STAGE_REST;
-        return true;
+        break;
     }
-    return false;
+    return true;
 }
 
 /* One step of emission; false if there is nothing to emit. The ring has room for RING_RESERVE segments. */
@@ -675,7 +661,6 @@ static void drop_emission(void)
     ahead_ticks = 0;
     ramp_state = MOTION_STANDBY;
     tail_awaited = false;
-    tail_valid = false;
 }
 
 /* -- starting and joining ----------------------------------------------------------------------------------------- */
@@ -695,6 +680,19 @@ static void begin_ring(void)
     joined = false;
     single = false;
     drop_emission();
+}
+
+static void forget_velocity(void)
+{
+    v_in_play = basis.v_slow;
+    in_play_cycle_us = 0;
+}
+
+/* Is the velocity in play kept until now? */
+static void expire_gap(void)
+{
+    if (gap_on)
+        forget_velocity();
 }
 
 static void plan(void)
@@ -775,35 +773,36 @@ static uint16_t begin_cruise(void)
     if ((uint32_t)run * ticks < START_TICKS)
         return 0;
     profile.accel_pulses = profile.cruise_pulses = profile.decel_pulses = 0;
-    push(run, (uint16_t)(ticks - 1), true, MOTION_CRUISE);
+    ramp_state = MOTION_CRUISE;
+    push(run, ticks, true);
+    play();
     return run;
 }
 
-/* Starts the command, which is not planned yet, from standstill. */
-static void start_now(void)
+/* Starts a command, which is not planned yet, from standstill. */
+static void start(const motion_command_t *c)
 {
     begin_ring();
+    command = *c;
+    next_taken = false;
     step_port_dir(dir_level(is_ccw(&command)));
     uint8_t flags = direction_flags(&command, false);
-    uint16_t certain = certain_ticks();
     uint16_t cruised = 0;
+    stage = STAGE_LEAD;
     if (command.start_wait_us < 4096u) {
         uint16_t lead = (uint16_t)(command.start_wait_us * TICKS_PER_US);
-        if (lead < DIR_SETUP_TICKS + width_ticks)
-            lead = (uint16_t)(DIR_SETUP_TICKS + width_ticks);
-        append(1, (uint16_t)(lead - 1), width_ticks, flags);
-        add_pulses(flags, 1);
+        uint16_t least = (uint16_t)(DIR_SETUP_TICKS + width_ticks);
+        append_pulse(lead < least ? least : lead, flags);
         stage = STAGE_RUN;
-        if (certain) {
+        ahead_ticks = certain_ticks();
+        if (ahead_ticks) {
             flags = (uint8_t)(flags | (command.accel == ACCEL_NONE ? MOTION_CRUISE : MOTION_ACCEL));
-            append_silence(AHEAD_PERIODS, (uint16_t)(certain / AHEAD_PERIODS - 1), flags);
-            ahead_ticks = certain;
+            append_silence(AHEAD_PERIODS, (uint16_t)(ahead_ticks / AHEAD_PERIODS - 1), flags);
             play();
-        } else if ((cruised = begin_cruise()) != 0) {
-            play();
+        } else {
+            cruised = begin_cruise();
         }
     } else {
-        stage = STAGE_LEAD;
         emit(); /* sets the interval up, then its silence, then the pulse */
         emit();
         emit();
@@ -814,15 +813,6 @@ static void start_now(void)
     fill();
     if (!playing)
         play();
-}
-
-/* Is the velocity in play kept until now? */
-static void expire_gap(void)
-{
-    if (gap_on) {
-        v_in_play = basis.v_slow;
-        in_play_cycle_us = 0;
-    }
 }
 
 /* Ticks of the start wait, saturated. */
@@ -837,7 +827,7 @@ static uint32_t ticks_to_tail(void)
     step_snapshot_t at = step_port_snapshot();
     uint8_t offset = (uint8_t)(at.tail - SEGMENT_BYTES);
     look_for_end();
-    if (!tail_valid || !tail_awaited)
+    if (!tail_awaited)
         return 0;
     if (offset == tail_offset) {
         /* It is loaded: what is left of the period before it. */
@@ -864,55 +854,59 @@ static bool tail_is_over(void)
 static void join_next(void)
 {
     uint32_t ticks = ticks_to_tail();
+    if (ticks > JOIN_SOON_TICKS)
+        return; /* later */
     uint16_t needed = next.flags & MOTION_LINEAR ? JOIN_LINEAR_TICKS : JOIN_TICKS;
     if (next.accel == ACCEL_NONE && next.decel == ACCEL_NONE)
         needed = JOIN_FLAT_TICKS;
-    bool timely = ticks >= needed;
-    if (ticks > JOIN_SOON_TICKS)
-        return; /* later */
-    if (!timely && !tail_is_over())
-        return; /* at its end */
-    bool turns = is_ccw(&next) != is_ccw(&command);
-    uint8_t flags = (uint8_t)(MOTION_STOP | direction_flags(&next, turns));
-    uint32_t wait = wait_ticks(next.start_wait_us);
-    if (timely) {
-        uint8_t offset = tail_offset;
-        bool done;
-        if (wait >= SHORTEST_PIECE_TICKS) {
-            done = step_port_drop_after(offset);
-        } else if (tail_fast && !turns && wait == 0) {
-            offset = last_run_offset;
-            done = step_port_extend(offset);
-        } else {
-            uint16_t top = (uint16_t)(segment_at(offset)->top + wait);
-            if (turns && top < TURN_TICKS + width_ticks)
-                top = (uint16_t)(TURN_TICKS + width_ticks);
-            done = step_port_arm(offset, top, (uint16_t)(top - width_ticks), flags);
+    if (ticks < needed) {
+        if (tail_is_over()) { /* else at its end */
+            if (step_idle)
+                expire_gap();
+            start(&next);
         }
-        if (!done)
-            return; /* not at this moment */
-        joined_offset = offset;
-    }
-    command = next;
-    next_taken = false;
-    if (!timely) {
-        if (step_idle)
-            expire_gap();
-        start_now();
         return;
     }
+    bool turns = is_ccw(&next) != is_ccw(&command);
+    uint32_t wait = wait_ticks(next.start_wait_us);
+    bool waits = wait >= SHORTEST_PIECE_TICKS;
+    uint8_t flags = (uint8_t)(MOTION_STOP | direction_flags(&next, turns));
+    uint8_t offset = tail_offset;
+    bool done;
+    if (tail_fast && !turns && wait == 0) {
+        offset = (uint8_t)(offset - SEGMENT_BYTES); /* the last run */
+        done = step_port_extend(offset);
+    } else {
+        const segment_t *tail = segment_at(offset);
+        uint16_t top = tail->top;
+        uint16_t match = SEGMENT_SILENT;
+        if (waits) {
+            flags = tail->flags;
+        } else {
+            top = (uint16_t)(top + wait);
+            if (turns && top < TURN_TICKS + width_ticks)
+                top = (uint16_t)(TURN_TICKS + width_ticks);
+            match = (uint16_t)(top - width_ticks);
+        }
+        done = step_port_arm(offset, top, match, flags);
+    }
+    if (!done)
+        return; /* not at this moment */
+    joined_offset = offset;
+    command = next;
+    next_taken = false;
     drop_emission();
     joined = true;
     ended++;
     /* Longer than the gap the wait means a start from slow speed. */
     if (wait >> PROFILE_CHUNK_LOG2 >= closing_chunks && wait > (closing_chunks << PROFILE_CHUNK_LOG2) + closing_ticks)
         expire_gap();
-    stage = STAGE_RUN;
-    if (wait >= SHORTEST_PIECE_TICKS) {
+    if (waits) {
         dir_due = turns;
         stage = STAGE_LEAD;
     } else {
         add_pulses(flags, 1);
+        stage = STAGE_RUN;
     }
     plan();
     fill();
@@ -931,8 +925,7 @@ bool engine_can_accept(void)
 void engine_submit(const motion_command_t *submitted)
 {
     if (!playing) {
-        command = *submitted;
-        start_now();
+        start(submitted);
     } else {
         next = *submitted;
         next_taken = true;
@@ -953,15 +946,11 @@ NOINLINE bool engine_poll(void)
         } else if ((stage == STAGE_REST || stage == STAGE_GAP) && step_head == step_tail) {
             step_port_halt();
             playing = false;
-            tail_valid = false;
             single = false;
-            if (next_taken) {
-                next_taken = false;
-                command = next;
-                start_now();
-            } else {
+            if (next_taken)
+                start(&next);
+            else
                 expire_gap();
-            }
         } else if (step_head != step_tail) {
             /* The planner was so late that the timer ran out of segments: go on where it stopped. */
             if (stage == STAGE_RUN)
@@ -1025,8 +1014,7 @@ void engine_stop(void)
 {
     drop_next();
     halt();
-    v_in_play = basis.v_slow;
-    in_play_cycle_us = 0;
+    forget_velocity();
 }
 
 /* Ends the running command after what is to be played soon. Returns the interval there in ticks; 0: nothing to be cut
@@ -1041,30 +1029,29 @@ static uint32_t cut(void)
     const segment_t *s;
     for (;;) {
         s = segment_at(offset);
-        uint32_t period = period_ticks(s);
-        uint32_t ticks = period * left;
+        uint32_t ticks = ticks_of(s, left);
+        uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
         if (is_silent(s)) {
             if ((s->flags & SEGMENT_STATE_MASK) == MOTION_STOP)
                 return 0;
-        } else if ((ticks >= keep_ticks && (left > 1 || offset != (uint8_t)(at.tail - SEGMENT_BYTES))) ||
-                   (uint8_t)(offset + SEGMENT_BYTES) == step_head) {
+        } else if ((ticks >= keep_ticks && (left > 1 || after != at.tail)) || after == step_head) {
             /* (Not the last period of the loaded segment: what follows it may be loaded meanwhile.) */
-            uint16_t needed = (uint16_t)(keep_ticks / period + 4u);
+            uint16_t needed = (uint16_t)(keep_ticks / ticks_of(s, 1) + 4u);
             if (needed < left)
                 left = needed;
             break;
         }
         keep_ticks = keep_ticks > ticks ? keep_ticks - ticks : 0;
-        offset = (uint8_t)(offset + SEGMENT_BYTES);
-        if (offset == step_head)
+        if (after == step_head)
             return 0;
+        offset = after;
         left = counted_periods(segment_at(offset));
     }
     uint32_t interval_ticks = interval_at(offset);
     if (interval_ticks > basis.slow_ticks + 1)
         return 0;
-    emitted -= pulses_from((uint8_t)(offset + SEGMENT_BYTES));
-    emitted -= signed_pulses(s, step_port_shorten(offset, left));
+    int32_t dropped = pulses_from((uint8_t)(offset + SEGMENT_BYTES));
+    emitted -= dropped + signed_pulses(s, step_port_shorten(offset, left));
     drop_emission();
     return interval_ticks;
 }
@@ -1082,8 +1069,7 @@ static void end_command(accel_code_t decel, bool linear)
         if (state == MOTION_STANDBY || stage == STAGE_RUN || silence_chunks || piece_ticks) {
             /* In a start wait or at slow speed: there is nothing to ramp down from. */
             halt();
-            v_in_play = basis.v_slow;
-            in_play_cycle_us = 0;
+            forget_velocity();
         }
         return;
     }
@@ -1130,9 +1116,7 @@ void engine_single_pulse(bool ccw)
     single = true;
     command.flags = ccw ? MOTION_CCW : 0;
     uint8_t flags = direction_flags(&command, true);
-    uint16_t width = width_ticks;
-    append(1, (uint16_t)(TURN_TICKS + width - 1), width, flags);
-    add_pulses(flags, 1);
+    append_pulse((uint16_t)(TURN_TICKS + width_ticks), flags);
     play();
 }
 
