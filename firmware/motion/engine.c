@@ -42,43 +42,50 @@ typedef enum {
     STAGE_END,
 } stage_t;
 
+typedef struct {
+    uint16_t width_ticks; /* of a pulse */
+    bool next_taken;
+    bool playing; /* the timer runs (it may play silence) */
+    stage_t stage;
+    motion_state_t ramp_state; /* the phase being emitted, that `ramp` was begun for; MOTION_STANDBY: none */
+    uint32_t *phase_left;      /* its pulses, in `profile` */
+
+    uint32_t silence_chunks; /* still to be emitted before ... */
+    uint16_t piece_ticks;    /* ... this period; 0: none */
+    bool piece_pulse;
+    uint16_t owed;        /* held pulses still to be left out */
+    int32_t carry_q16;    /* 1/65536 ticks rounded off so far */
+    uint16_t ahead_ticks; /* part of the next interval that has been emitted as silence */
+    bool dir_due;         /* the next single period sets the dir pin */
+
+    uint32_t closing_chunks; /* closing interval of the last command emitted: so many PROFILE_CHUNK_TICKS ... */
+    uint16_t closing_ticks;  /* ... and these */
+    uint16_t tail_ticks;     /* its end */
+    bool tail_fast;          /* too fast for a tail: a following command lengthens the last run instead */
+    uint8_t tail_offset;     /* the tail's segment, while stage is REST, GAP or END */
+    bool tail_awaited;       /* it has not begun: its command has not ended, and another one can be joined to it */
+    bool joined;             /* the ring holds the end of one command and the beginning of the next one ... */
+    uint8_t joined_offset;   /* ... which begins at the end of this segment */
+
+    int32_t emitted; /* position, in pulses, when all that is in the ring has been played */
+    uint32_t v_in_play;
+    uint32_t in_play_cycle_us; /* 0: follows from v_in_play */
+    uint8_t ended;
+    uint8_t faults;
+    bool gap_off;
+    bool single; /* the ring plays single pulses */
+} engine_t;
+
+static engine_t engine;
 static profile_basis_t basis;
-static uint16_t width_ticks; /* of a pulse */
+static uint32_t certain_centi;   /* steepest linear ramp whose first interval is longer than AHEAD_LONG_TICKS */
 static motion_command_t command; /* being emitted or played */
-static profile_t profile;        /* what is left of it to be emitted */
 static motion_command_t next;    /* taken, not begun */
-static bool next_taken;
-static bool playing; /* the timer runs (it may play silence) */
-static stage_t stage;
+static profile_t profile;        /* what is left of the command to be emitted */
 static ramp_t ramp;
-static motion_state_t ramp_state; /* the phase that `ramp` was begun for; MOTION_STANDBY: none */
-static uint32_t *phase_left;       /* pulses of the phase being emitted, in `profile` */
-static block_t block;             /* of that phase, while it has runs left */
+static block_t block; /* of the phase being emitted, while it has runs left */
 
-static uint32_t silence_chunks;  /* still to be emitted before ... */
-static uint16_t piece_ticks;     /* ... this period; 0: none */
-static bool piece_pulse;
-static uint16_t owed;            /* held pulses still to be left out */
-static int32_t carry_q16;        /* 1/65536 ticks rounded off so far */
-static uint16_t ahead_ticks;     /* part of the next interval that has been emitted as silence */
-static bool dir_due;             /* the next single period sets the dir pin */
-static uint32_t closing_chunks;  /* closing interval of the last command emitted: so many PROFILE_CHUNK_TICKS ... */
-static uint16_t closing_ticks;   /* ... and these */
-static uint8_t tail_offset;      /* its tail segment, while stage is REST, GAP or END */
-static bool tail_awaited;        /* it has not begun: its command has not ended, and another one can be joined to it */
-static bool joined;              /* the ring holds the end of one command and the beginning of the next one ... */
-static uint8_t joined_offset;    /* ... which begins at the end of this segment */
-static uint16_t tail_ticks;
-static bool tail_fast;           /* too fast for a tail: a following command lengthens the last run instead */
-
-static int32_t emitted; /* position, in pulses, when all that is in the ring has been played */
-static uint8_t ended;
-static uint8_t faults;
-static uint32_t certain_centi; /* steepest linear ramp whose first interval is longer than AHEAD_LONG_TICKS */
-static bool gap_on = true;
-static uint32_t v_in_play;
-static uint32_t in_play_cycle_us; /* 0: follows from v_in_play */
-static bool single;               /* the ring plays single pulses */
+#define HERE HIDDEN(&engine)
 
 static bool dir_level(bool ccw)
 {
@@ -104,17 +111,18 @@ static uint8_t direction_flags(const motion_command_t *c, bool turn)
 
 void engine_init(void)
 {
+    engine_t *e = &engine;
     profile_basis(&basis, settings.steps_per_rev, settings.ustep, settings.slow_rpm);
-    v_in_play = basis.v_slow;
+    e->v_in_play = basis.v_slow;
     certain_centi = (130000000u >> basis.factor_log2) / basis.steps_per_rev;
-    width_ticks = (uint16_t)settings.pulse_us * TICKS_PER_US;
+    e->width_ticks = (uint16_t)settings.pulse_us * TICKS_PER_US;
     step_port_init();
 }
 
 /* -- the ring -------------------------------------------------------------------------------------------------- */
 
 /* So many periods before its end such a segment's reload is begun. */
-static uint8_t early_periods(const segment_t *s)
+static NOINLINE uint8_t early_periods(const segment_t *s)
 {
     return (uint8_t)((s->flags & SEGMENT_EARLY_MASK) >> SEGMENT_EARLY_SHIFT);
 }
@@ -168,10 +176,11 @@ static NOINLINE uint8_t pulses_to_come(uint16_t planned)
 
 static void add_pulses(uint8_t flags, uint16_t pulses)
 {
+    engine_t *e = HERE;
     if (flags & (1 << SEGMENT_CCW_BIT))
-        emitted -= pulses;
+        e->emitted -= pulses;
     else
-        emitted += pulses;
+        e->emitted += pulses;
 }
 
 /* Is the one-period segment at `offset` being played, or over? (It is loaded one period before it begins, and what comes
@@ -184,11 +193,12 @@ static bool has_begun(uint8_t offset)
 /* The command whose closing interval has begun its tail has ended. */
 static void look_for_end(void)
 {
-    if (joined && has_begun(joined_offset))
-        joined = false;
-    if (tail_awaited && has_begun(tail_offset)) {
-        tail_awaited = false;
-        ended++;
+    engine_t *e = HERE;
+    if (e->joined && has_begun(e->joined_offset))
+        e->joined = false;
+    if (e->tail_awaited && has_begun(e->tail_offset)) {
+        e->tail_awaited = false;
+        e->ended++;
     }
 }
 
@@ -200,18 +210,19 @@ static NOINLINE uint8_t give(uint32_t *phase, uint8_t pulses)
 }
 
 /* The interrupt has repeated the last interval because the ring was empty: so many pulses fewer are to be made. */
-static NOINLINE void absorb_held(void)
+static void absorb_held(void)
 {
+    engine_t *e = HERE;
     uint8_t lock = atomic_begin();
     uint8_t held = step_held;
     step_held = 0;
     atomic_end(lock);
-    faults |= ENGINE_FAULT_STARVED;
+    e->faults |= ENGINE_FAULT_STARVED;
     add_pulses(step_flags, held);
     /* The cruise becomes shorter, or, where there is none, the ramps; the closing interval stays. */
     uint32_t left = profile_pulses_left();
     uint8_t given = left > held ? held : left ? (uint8_t)(left - 1) : 0;
-    owed = (uint16_t)(owed + held - given);
+    e->owed = (uint16_t)(e->owed + held - given);
     give(&profile.decel_pulses, give(&profile.accel_pulses, give(&profile.cruise_pulses, given)));
 }
 
@@ -238,14 +249,15 @@ static NOINLINE bool settle(uint8_t hold)
  * need an early reload, no more of them than are waited for) are stretched: their count stays exact. */
 static void push(uint16_t periods, uint16_t ticks, bool pulse)
 {
+    engine_t *e = HERE;
     segment_t *s = segment_at(step_head);
-    bool turn = dir_due && periods == 1;
-    uint8_t flags = (uint8_t)(ramp_state | direction_flags(&command, turn));
-    dir_due = dir_due && !turn;
+    bool turn = e->dir_due && periods == 1;
+    uint8_t flags = (uint8_t)(e->ramp_state | direction_flags(&command, turn));
+    e->dir_due = e->dir_due && !turn;
     settle(pulse ? pulses_to_come(0) : 0);
     if (pulse) {
-        uint16_t given = owed < periods ? owed : periods;
-        owed = (uint16_t)(owed - given);
+        uint16_t given = e->owed < periods ? e->owed : periods;
+        e->owed = (uint16_t)(e->owed - given);
         periods = (uint16_t)(periods - given);
         add_pulses(flags, periods);
     }
@@ -260,7 +272,7 @@ static void push(uint16_t periods, uint16_t ticks, bool pulse)
         top = SEGMENT_EARLY1_BELOW_TICKS - 1;
     }
     s->top = top;
-    s->match = pulse ? (uint16_t)(top - width_ticks) : SEGMENT_SILENT;
+    s->match = pulse ? (uint16_t)(top - e->width_ticks) : SEGMENT_SILENT;
     s->count_low = (uint8_t)periods;
     s->count_high = (uint8_t)((uint16_t)(periods - 1) >> 8);
     s->flags = flags;
@@ -309,8 +321,9 @@ static int32_t pulses_from(uint8_t offset)
 
 int32_t engine_position(void)
 {
-    if (!playing)
-        return emitted;
+    engine_t *e = HERE;
+    if (!e->playing)
+        return e->emitted;
     step_snapshot_t at = step_port_snapshot();
     uint8_t loaded_offset = (uint8_t)(at.tail - SEGMENT_BYTES);
     const segment_t *loaded = segment_at(loaded_offset);
@@ -323,7 +336,7 @@ int32_t engine_position(void)
         to_come += signed_pulses(loaded, (uint16_t)(at.to_count + early_periods(loaded)));
     if (!at.pulse_high && !at.period_over && !step_idle)
         to_come += signed_pulses(running, 1);
-    return emitted - to_come;
+    return e->emitted - to_come;
 }
 
 /* -- emission -------------------------------------------------------------------------------------------------- */
@@ -332,8 +345,9 @@ int32_t engine_position(void)
  * into segments. */
 static void set_interval(uint32_t chunks, int32_t ticks, bool pulse)
 {
-    ticks -= ahead_ticks;
-    ahead_ticks = 0;
+    engine_t *e = HERE;
+    ticks -= e->ahead_ticks;
+    e->ahead_ticks = 0;
     chunks += (uint32_t)(ticks >> PROFILE_CHUNK_LOG2);
     uint16_t piece = (uint16_t)((uint16_t)ticks % PROFILE_CHUNK_TICKS);
     /* No piece too short, and what fits a period is one. */
@@ -341,21 +355,22 @@ static void set_interval(uint32_t chunks, int32_t ticks, bool pulse)
         piece = (uint16_t)(piece + PROFILE_CHUNK_TICKS);
         chunks--;
     }
-    silence_chunks = chunks;
-    piece_ticks = piece;
-    piece_pulse = pulse;
+    e->silence_chunks = chunks;
+    e->piece_ticks = piece;
+    e->piece_pulse = pulse;
 }
 
 /* Adds the carried fraction to a time; what remains is carried on. */
 static NOINLINE uint32_t take_carry(uint32_t ticks, uint16_t frac_q16)
 {
-    int32_t carry = carry_q16 + frac_q16;
-    carry_q16 = carry & 0xFFFF;
+    engine_t *e = HERE;
+    int32_t carry = e->carry_q16 + frac_q16;
+    e->carry_q16 = carry & 0xFFFF;
     return (uint32_t)((int32_t)ticks + (carry >> 16));
 }
 
 /* push() without its cases: pulses of at least SEGMENT_EARLY1_BELOW_TICKS, many more to come. */
-static void append(uint16_t periods, uint16_t top, uint16_t width, uint8_t flags)
+static NOINLINE void append(uint16_t periods, uint16_t top, uint16_t width, uint8_t flags)
 {
     segment_t *s = segment_at(step_head);
     s->top = top;
@@ -369,7 +384,8 @@ static void append(uint16_t periods, uint16_t top, uint16_t width, uint8_t flags
 /* One pulse. */
 static void append_pulse(uint16_t ticks, uint8_t flags)
 {
-    append(1, (uint16_t)(ticks - 1), width_ticks, flags);
+    engine_t *e = HERE;
+    append(1, (uint16_t)(ticks - 1), e->width_ticks, flags);
     add_pulses(flags, 1);
 }
 
@@ -378,11 +394,12 @@ static void append_silence(uint16_t periods, uint16_t top, uint8_t flags)
     append(periods, top, (uint16_t)(top - SEGMENT_SILENT), flags);
 }
 
-static void begin_ramp(motion_state_t state)
+static NOINLINE void begin_ramp(motion_state_t state)
 {
-    if (ramp_state == state)
+    engine_t *e = HERE;
+    if (e->ramp_state == state)
         return;
-    ramp_state = state;
+    e->ramp_state = state;
     if (state == MOTION_ACCEL)
         profile_begin_accel(&profile, &basis, &ramp);
     else
@@ -390,17 +407,19 @@ static void begin_ramp(motion_state_t state)
 }
 
 /* Does the phase have its longer intervals first? */
-static bool speeds_up(void)
+static NOINLINE bool speeds_up(void)
 {
-    return ramp_state == MOTION_ACCEL && profile.faster;
+    engine_t *e = &engine;
+    return e->ramp_state == MOTION_ACCEL && profile.faster;
 }
 
 /* `pulses` intervals of the phase that last `ticks` together: of two neighbouring values. Too few of either kind for an
  * early reload are made like the others, and the difference is carried. */
 static void emit_flat(uint16_t pulses, uint32_t ticks)
 {
+    engine_t *e = &engine;
     if (pulses == 1) {
-        if (ticks > 65535u || ahead_ticks)
+        if (ticks > 65535u || e->ahead_ticks)
             set_interval(0, (int32_t)ticks, true);
         else
             push(1, (uint16_t)ticks, true);
@@ -414,8 +433,8 @@ static void emit_flat(uint16_t pulses, uint32_t ticks)
         longer = 0;
     else if (pulses - longer <= early)
         longer = pulses;
-    carry_q16 += (int32_t)(int16_t)(ideal - longer) * 65536;
-    bool first = ramp_state == MOTION_CRUISE || speeds_up();
+    e->carry_q16 += (int32_t)(int16_t)(ideal - longer) * 65536;
+    bool first = e->ramp_state == MOTION_CRUISE || speeds_up();
     if (first && longer)
         push(longer, (uint16_t)(each + 1), true);
     if (pulses != longer)
@@ -427,13 +446,15 @@ static void emit_flat(uint16_t pulses, uint32_t ticks)
 /* The phase's pulses that may be emitted: the last one of all has the closing interval. */
 static NOINLINE uint32_t pulses_of_phase(void)
 {
+    engine_t *e = &engine;
     uint32_t most = profile_pulses_left() - 1;
-    return *phase_left < most ? *phase_left : most;
+    return *e->phase_left < most ? *e->phase_left : most;
 }
 
 /* Appends what the ring has room for of the block. */
 static void emit_block(void)
 {
+    engine_t *e = HERE;
     uint8_t pulses = block.pulses;
     uint8_t runs = block.runs;
     uint16_t planned = (uint16_t)(runs * pulses);
@@ -444,21 +465,22 @@ static void emit_block(void)
     }
     block_append(&block);
     uint16_t made = (uint16_t)((uint8_t)(runs - block.runs) * pulses);
-    *phase_left -= made;
+    *e->phase_left -= made;
     add_pulses(block.flags, made);
     if (block.runs == 0)
-        carry_q16 += (int32_t)(block.shape & BLOCK_SPLIT ? block.carry_q16 : (uint32_t)block.carry_q16 * pulses);
+        e->carry_q16 += (int32_t)(block.shape & BLOCK_SPLIT ? block.carry_q16 : (uint32_t)block.carry_q16 * pulses);
 }
 
 /* What the block's runs do not say: the ticks carried so far, their segments' flags. */
 static void begin_block(void)
 {
+    engine_t *e = HERE;
     bool split = block.top_q16 >> 16 >= BLOCK_SPLIT_TICKS - 1;
     block.shape = (uint8_t)((speeds_up() ? BLOCK_FASTER : 0) | (split ? BLOCK_SPLIT : 0));
     uint32_t carry = 0;
-    if (carry_q16 > 0) { /* otherwise it waits for a single interval */
-        carry = (uint32_t)carry_q16;
-        carry_q16 = 0;
+    if (e->carry_q16 > 0) { /* otherwise it waits for a single interval */
+        carry = (uint32_t)e->carry_q16;
+        e->carry_q16 = 0;
         if (!split || carry > UINT16_MAX) {
             carry /= block.pulses; /* of each interval */
             if (split || carry > UINT16_MAX) { /* left by runs of more pulses */
@@ -468,14 +490,15 @@ static void begin_block(void)
         }
     }
     block.carry_q16 = (uint16_t)carry;
-    block.width_ticks = width_ticks;
-    block.flags = (uint8_t)(ramp_state | direction_flags(&command, false));
+    block.width_ticks = e->width_ticks;
+    block.flags = (uint8_t)(e->ramp_state | direction_flags(&command, false));
 }
 
 /* The next intervals of the ramp of `ramp_state`: pulses all alike, a block, or some of the former before a block. */
 static void emit_ramp(uint32_t at_most)
 {
-    if (ahead_ticks || dir_due || owed)
+    engine_t *e = &engine;
+    if (e->ahead_ticks || e->dir_due || e->owed)
         at_most = 1;
     uint32_t ticks = 0;
     uint8_t pulses = 0;
@@ -490,13 +513,14 @@ static void emit_ramp(uint32_t at_most)
         pulses = (uint8_t)(pulses + group);
         at_most -= group;
     } while (ramp.rest && at_most);
-    *phase_left -= pulses;
+    *e->phase_left -= pulses;
     if (pulses)
         emit_flat(pulses, ticks);
 }
 
 static void emit_cruise(uint32_t at_most)
 {
+    engine_t *e = &engine;
     const profile_interval_t *interval = &profile.cruise;
     uint32_t ticks = interval->ticks_q8 >> 8;
     uint8_t frac = (uint8_t)interval->ticks_q8;
@@ -505,14 +529,14 @@ static void emit_cruise(uint32_t at_most)
         ticks += PROFILE_CHUNK_TICKS;
         chunks = 0;
     }
-    if (chunks || ahead_ticks) {
-        (*phase_left)--;
+    if (chunks || e->ahead_ticks) {
+        (*e->phase_left)--;
         set_interval(chunks, (int32_t)take_carry(ticks, (uint16_t)(frac << 8)), true);
         return;
     }
     uint16_t run = at_most > RUN_MAX_PERIODS ? RUN_MAX_PERIODS : (uint16_t)at_most;
     if (frac == 0 || run < 8) {
-        *phase_left -= run;
+        *e->phase_left -= run;
         uint32_t fraction = (uint32_t)frac * run;
         emit_flat(run, take_carry(ticks * run + (fraction >> 8), (uint16_t)(fraction << 8)));
         return;
@@ -535,10 +559,11 @@ static void emit_cruise(uint32_t at_most)
 /* The interval after the last pulse of the command, which is of this phase: body, then tail. */
 static void begin_closing(void)
 {
+    engine_t *e = HERE;
     profile_t *p = &profile;
     ramp_time_t last;
     uint32_t chunks = 0;
-    if (ramp_state == MOTION_CRUISE) {
+    if (e->ramp_state == MOTION_CRUISE) {
         chunks = p->cruise.chunks;
         last.ticks = p->cruise.ticks_q8 >> 8;
         last.frac_q16 = (uint16_t)(p->cruise.ticks_q8 << 8);
@@ -548,53 +573,55 @@ static void begin_closing(void)
     uint32_t ticks = take_carry(last.ticks, last.frac_q16);
     chunks += ticks >> PROFILE_CHUNK_LOG2;
     ticks &= PROFILE_CHUNK_TICKS - 1;
-    *phase_left = 0;
-    closing_chunks = chunks;
-    closing_ticks = (uint16_t)ticks;
-    tail_ticks = TAIL_TICKS;
+    *e->phase_left = 0;
+    e->closing_chunks = chunks;
+    e->closing_ticks = (uint16_t)ticks;
+    e->tail_ticks = TAIL_TICKS;
     if (chunks || ticks >= 2 * TAIL_TICKS)
         set_interval(chunks, (int32_t)(ticks - TAIL_TICKS), false);
     else
-        tail_ticks = (uint16_t)ticks;
-    tail_fast = tail_ticks < SEGMENT_EARLY1_BELOW_TICKS;
-    if (tail_fast)
-        tail_ticks = SHORTEST_PIECE_TICKS;
-    stage = STAGE_TAIL;
+        e->tail_ticks = (uint16_t)ticks;
+    e->tail_fast = e->tail_ticks < SEGMENT_EARLY1_BELOW_TICKS;
+    if (e->tail_fast)
+        e->tail_ticks = SHORTEST_PIECE_TICKS;
+    e->stage = STAGE_TAIL;
 }
 
 static void push_tail(void)
 {
-    tail_offset = step_head;
-    ramp_state = MOTION_STOP;
-    push(1, tail_ticks, false);
-    tail_awaited = true;
+    engine_t *e = HERE;
+    e->tail_offset = step_head;
+    e->ramp_state = MOTION_STOP;
+    push(1, e->tail_ticks, false);
+    e->tail_awaited = true;
 }
 
 /* What comes next, but for a block, which is only begun. False if there is nothing. */
 static bool emit_other(void)
 {
-    if (silence_chunks) {
-        uint16_t periods = silence_chunks > RUN_MAX_PERIODS ? RUN_MAX_PERIODS : (uint16_t)silence_chunks;
-        silence_chunks -= periods;
+    engine_t *e = HERE;
+    if (e->silence_chunks) {
+        uint16_t periods = e->silence_chunks > RUN_MAX_PERIODS ? RUN_MAX_PERIODS : (uint16_t)e->silence_chunks;
+        e->silence_chunks -= periods;
         push(periods, PROFILE_CHUNK_TICKS, false);
         return true;
     }
-    if (piece_ticks) {
-        uint16_t ticks = piece_ticks;
-        piece_ticks = 0;
-        push(1, ticks, piece_pulse);
+    if (e->piece_ticks) {
+        uint16_t ticks = e->piece_ticks;
+        e->piece_ticks = 0;
+        push(1, ticks, e->piece_pulse);
         return true;
     }
     profile_t *p = &profile;
-    switch (stage) {
+    switch (e->stage) {
     case STAGE_REST:
         return false;
     case STAGE_LEAD: {
         /* The start wait, then the first pulse. */
         uint32_t us = command.start_wait_us;
-        ramp_state = MOTION_STANDBY;
+        e->ramp_state = MOTION_STANDBY;
         set_interval(us >> PROFILE_CHUNK_US_LOG2, (int32_t)((uint16_t)us % PROFILE_CHUNK_US * TICKS_PER_US), true);
-        stage = STAGE_RUN;
+        e->stage = STAGE_RUN;
         break;
     }
     case STAGE_RUN: {
@@ -604,10 +631,10 @@ static bool emit_other(void)
             left++; /* cruise, deceleration */
             state++;
         }
-        phase_left = left;
+        e->phase_left = left;
         uint32_t at_most = pulses_of_phase();
         if (state == MOTION_CRUISE)
-            ramp_state = MOTION_CRUISE;
+            e->ramp_state = MOTION_CRUISE;
         else
             begin_ramp(state);
         if (at_most == 0)
@@ -620,21 +647,21 @@ static bool emit_other(void)
     }
     case STAGE_TAIL:
         push_tail();
-        v_in_play = p->v_exit;
-        in_play_cycle_us = p->exit_cycle_us;
-        stage = STAGE_GAP;
+        e->v_in_play = p->v_exit;
+        e->in_play_cycle_us = p->exit_cycle_us;
+        e->stage = STAGE_GAP;
         break;
     case STAGE_GAP:
-        if (next_taken)
+        if (e->next_taken)
             return false; /* it will be joined */
-        ramp_state = MOTION_STANDBY;
-        if (gap_on)
-            set_interval(closing_chunks, tail_fast ? tail_ticks : closing_ticks, false);
-        stage = STAGE_END;
+        e->ramp_state = MOTION_STANDBY;
+        if (!e->gap_off)
+            set_interval(e->closing_chunks, e->tail_fast ? e->tail_ticks : e->closing_ticks, false);
+        e->stage = STAGE_END;
         break;
     case STAGE_END:
         push(1, SHORTEST_PIECE_TICKS, false);
-        stage = STAGE_REST;
+        e->stage = STAGE_REST;
         break;
     }
     return true;
@@ -655,54 +682,60 @@ static bool emit(void)
 /* Nothing of the command is to be emitted any more, or joined to. */
 static void drop_emission(void)
 {
-    silence_chunks = 0;
-    piece_ticks = 0;
+    engine_t *e = HERE;
+    e->silence_chunks = 0;
+    e->piece_ticks = 0;
     block.runs = 0;
-    ahead_ticks = 0;
-    ramp_state = MOTION_STANDBY;
-    tail_awaited = false;
+    e->ahead_ticks = 0;
+    e->ramp_state = MOTION_STANDBY;
+    e->tail_awaited = false;
 }
 
 /* -- starting and joining ----------------------------------------------------------------------------------------- */
 
 static void begin_ring(void)
 {
-    if (playing)
+    engine_t *e = &engine;
+    if (e->playing)
         step_port_halt();
-    playing = false;
+    e->playing = false;
     step_head = step_tail = 0;
     step_hold = 0;
     step_held = 0;
     step_idle = 0;
-    owed = 0;
-    carry_q16 = 0;
-    dir_due = false;
-    joined = false;
-    single = false;
+    e->owed = 0;
+    e->carry_q16 = 0;
+    e->dir_due = false;
+    e->joined = false;
+    e->single = false;
     drop_emission();
 }
 
 static void forget_velocity(void)
 {
-    v_in_play = basis.v_slow;
-    in_play_cycle_us = 0;
+    engine_t *e = HERE;
+    e->v_in_play = basis.v_slow;
+    e->in_play_cycle_us = 0;
 }
 
 /* Is the velocity in play kept until now? */
 static void expire_gap(void)
 {
-    if (gap_on)
+    engine_t *e = &engine;
+    if (!e->gap_off)
         forget_velocity();
 }
 
 static void plan(void)
 {
-    profile_plan(&profile, &basis, &command, v_in_play);
+    engine_t *e = HERE;
+    profile_plan(&profile, &basis, &command, e->v_in_play);
 }
 
-static void play(void)
+static NOINLINE void play(void)
 {
-    playing = true;
+    engine_t *e = &engine;
+    e->playing = true;
     step_port_start();
 }
 
@@ -710,7 +743,8 @@ static void play(void)
  * the planning. Returns how much of that interval may certainly be begun, from few operations; 0: plan first. */
 static uint16_t certain_ticks(void)
 {
-    if (v_in_play != basis.v_slow)
+    engine_t *e = HERE;
+    if (e->v_in_play != basis.v_slow)
         return 0;
     if (command.accel == ACCEL_NONE) { /* the cruise interval, or that of the deceleration */
         uint16_t flat = command.decel == ACCEL_NONE ? AHEAD_SHORT_TICKS : AHEAD_LONG_TICKS;
@@ -742,11 +776,12 @@ static uint16_t certain_ticks(void)
  * runs, until the intervals that are slow to plan, one by one, are over. */
 static void fill(void)
 {
+    engine_t *e = HERE;
     uint32_t ticks = 0;
     uint16_t periods = 0;
     uint8_t offset = step_head;
     while ((ticks < START_TICKS || periods < START_PERIODS ||
-            (!playing && (ramp_state == MOTION_ACCEL || ramp_state == MOTION_DECEL) &&
+            (!e->playing && (e->ramp_state == MOTION_ACCEL || e->ramp_state == MOTION_DECEL) &&
              (ramp.steep > 1 || ramp.group_log2 == 0))) &&
            ring_free() >= RING_RESERVE && emit()) {
         uint16_t first = counted_periods(segment_at(offset));
@@ -760,6 +795,7 @@ static void fill(void)
  * last for long enough. Emits them and returns how many; 0: plan first. */
 static uint16_t begin_cruise(void)
 {
+    engine_t *e = HERE;
     uint8_t factor_log2 = basis.factor_log2;
     if (command.accel != ACCEL_NONE || command.decel != ACCEL_NONE)
         return 0;
@@ -773,7 +809,7 @@ static uint16_t begin_cruise(void)
     if ((uint32_t)run * ticks < START_TICKS)
         return 0;
     profile.accel_pulses = profile.cruise_pulses = profile.decel_pulses = 0;
-    ramp_state = MOTION_CRUISE;
+    e->ramp_state = MOTION_CRUISE;
     push(run, ticks, true);
     play();
     return run;
@@ -782,22 +818,23 @@ static uint16_t begin_cruise(void)
 /* Starts a command, which is not planned yet, from standstill. */
 static void start(const motion_command_t *c)
 {
+    engine_t *e = &engine;
     begin_ring();
     command = *c;
-    next_taken = false;
+    e->next_taken = false;
     step_port_dir(dir_level(is_ccw(&command)));
     uint8_t flags = direction_flags(&command, false);
     uint16_t cruised = 0;
-    stage = STAGE_LEAD;
+    e->stage = STAGE_LEAD;
     if (command.start_wait_us < 4096u) {
         uint16_t lead = (uint16_t)(command.start_wait_us * TICKS_PER_US);
-        uint16_t least = (uint16_t)(DIR_SETUP_TICKS + width_ticks);
+        uint16_t least = (uint16_t)(DIR_SETUP_TICKS + e->width_ticks);
         append_pulse(lead < least ? least : lead, flags);
-        stage = STAGE_RUN;
-        ahead_ticks = certain_ticks();
-        if (ahead_ticks) {
+        e->stage = STAGE_RUN;
+        e->ahead_ticks = certain_ticks();
+        if (e->ahead_ticks) {
             flags = (uint8_t)(flags | (command.accel == ACCEL_NONE ? MOTION_CRUISE : MOTION_ACCEL));
-            append_silence(AHEAD_PERIODS, (uint16_t)(ahead_ticks / AHEAD_PERIODS - 1), flags);
+            append_silence(AHEAD_PERIODS, (uint16_t)(e->ahead_ticks / AHEAD_PERIODS - 1), flags);
             play();
         } else {
             cruised = begin_cruise();
@@ -811,12 +848,12 @@ static void start(const motion_command_t *c)
     plan();
     profile.cruise_pulses -= cruised;
     fill();
-    if (!playing)
+    if (!e->playing)
         play();
 }
 
 /* Ticks of the start wait, saturated. */
-static NOINLINE uint32_t wait_ticks(uint32_t us)
+static uint32_t wait_ticks(uint32_t us)
 {
     return us < UINT32_MAX / TICKS_PER_US ? us * TICKS_PER_US : UINT32_MAX;
 }
@@ -824,28 +861,30 @@ static NOINLINE uint32_t wait_ticks(uint32_t us)
 /* Ticks until the tail begins, or more than JOIN_SOON_TICKS; 0: it has begun. */
 static uint32_t ticks_to_tail(void)
 {
+    engine_t *e = HERE;
     step_snapshot_t at = step_port_snapshot();
     uint8_t offset = (uint8_t)(at.tail - SEGMENT_BYTES);
     look_for_end();
-    if (!tail_awaited)
+    if (!e->tail_awaited)
         return 0;
-    if (offset == tail_offset) {
+    if (offset == e->tail_offset) {
         /* It is loaded: what is left of the period before it. */
         uint16_t top = segment_at((uint8_t)(offset - SEGMENT_BYTES))->top;
         uint16_t counter = step_port_counter();
         return at.period_over || counter > top ? 0 : top - counter;
     }
-    return ticks_between(offset, at.to_count, tail_offset);
+    return ticks_between(offset, at.to_count, e->tail_offset);
 }
 
 /* Has the segment after the tail begun? (An idle timer is dealt with by engine_poll.) */
 static bool tail_is_over(void)
 {
+    engine_t *e = HERE;
     step_snapshot_t at = step_port_snapshot();
     uint8_t loaded = (uint8_t)(at.tail - SEGMENT_BYTES);
-    if (step_idle || !has_begun(tail_offset))
+    if (step_idle || !has_begun(e->tail_offset))
         return false;
-    return loaded != (uint8_t)(tail_offset + SEGMENT_BYTES) || at.to_count != counted_periods(segment_at(loaded));
+    return loaded != (uint8_t)(e->tail_offset + SEGMENT_BYTES) || at.to_count != counted_periods(segment_at(loaded));
 }
 
 /* Lets the command in `next` follow the one that has been emitted: exactly one interval after its last pulse where there
@@ -853,6 +892,7 @@ static bool tail_is_over(void)
  * that the running command can still be cut without the next one. */
 static void join_next(void)
 {
+    engine_t *e = HERE;
     uint32_t ticks = ticks_to_tail();
     if (ticks > JOIN_SOON_TICKS)
         return; /* later */
@@ -871,9 +911,9 @@ static void join_next(void)
     uint32_t wait = wait_ticks(next.start_wait_us);
     bool waits = wait >= SHORTEST_PIECE_TICKS;
     uint8_t flags = (uint8_t)(MOTION_STOP | direction_flags(&next, turns));
-    uint8_t offset = tail_offset;
+    uint8_t offset = e->tail_offset;
     bool done;
-    if (tail_fast && !turns && wait == 0) {
+    if (e->tail_fast && !turns && wait == 0) {
         offset = (uint8_t)(offset - SEGMENT_BYTES); /* the last run */
         done = step_port_extend(offset);
     } else {
@@ -884,29 +924,29 @@ static void join_next(void)
             flags = tail->flags;
         } else {
             top = (uint16_t)(top + wait);
-            if (turns && top < TURN_TICKS + width_ticks)
-                top = (uint16_t)(TURN_TICKS + width_ticks);
-            match = (uint16_t)(top - width_ticks);
+            if (turns && top < TURN_TICKS + e->width_ticks)
+                top = (uint16_t)(TURN_TICKS + e->width_ticks);
+            match = (uint16_t)(top - e->width_ticks);
         }
         done = step_port_arm(offset, top, match, flags);
     }
     if (!done)
         return; /* not at this moment */
-    joined_offset = offset;
+    e->joined_offset = offset;
     command = next;
-    next_taken = false;
+    e->next_taken = false;
     drop_emission();
-    joined = true;
-    ended++;
+    e->joined = true;
+    e->ended++;
     /* Longer than the gap the wait means a start from slow speed. */
-    if (wait >> PROFILE_CHUNK_LOG2 >= closing_chunks && wait > (closing_chunks << PROFILE_CHUNK_LOG2) + closing_ticks)
+    if (wait >> PROFILE_CHUNK_LOG2 >= e->closing_chunks && wait > (e->closing_chunks << PROFILE_CHUNK_LOG2) + e->closing_ticks)
         expire_gap();
     if (waits) {
-        dir_due = turns;
-        stage = STAGE_LEAD;
+        e->dir_due = turns;
+        e->stage = STAGE_LEAD;
     } else {
         add_pulses(flags, 1);
-        stage = STAGE_RUN;
+        e->stage = STAGE_RUN;
     }
     plan();
     fill();
@@ -919,51 +959,54 @@ status_t engine_check(const motion_command_t *c)
 
 bool engine_can_accept(void)
 {
-    return !next_taken;
+    engine_t *e = &engine;
+    return !e->next_taken;
 }
 
 void engine_submit(const motion_command_t *submitted)
 {
-    if (!playing) {
+    engine_t *e = HERE;
+    if (!e->playing) {
         start(submitted);
     } else {
         next = *submitted;
-        next_taken = true;
+        e->next_taken = true;
     }
 }
 
 NOINLINE bool engine_poll(void)
 {
+    engine_t *e = &engine;
     bool worked = false;
     look_for_end();
     if (step_late) {
         step_late = 0;
-        faults |= ENGINE_FAULT_LATE;
+        e->faults |= ENGINE_FAULT_LATE;
     }
-    if (playing && step_idle) {
+    if (e->playing && step_idle) {
         if (!step_port_snapshot().period_over) {
             /* The last period is not over. */
-        } else if ((stage == STAGE_REST || stage == STAGE_GAP) && step_head == step_tail) {
+        } else if ((e->stage == STAGE_REST || e->stage == STAGE_GAP) && step_head == step_tail) {
             step_port_halt();
-            playing = false;
-            single = false;
-            if (next_taken)
+            e->playing = false;
+            e->single = false;
+            if (e->next_taken)
                 start(&next);
             else
                 expire_gap();
         } else if (step_head != step_tail) {
             /* The planner was so late that the timer ran out of segments: go on where it stopped. */
-            if (stage == STAGE_RUN)
-                faults |= ENGINE_FAULT_STARVED;
+            if (e->stage == STAGE_RUN)
+                e->faults |= ENGINE_FAULT_STARVED;
             step_port_start();
         }
         worked = true;
     }
-    if (next_taken && playing && !single && (stage == STAGE_GAP || stage == STAGE_END || stage == STAGE_REST))
+    if (e->next_taken && e->playing && !e->single && (e->stage == STAGE_GAP || e->stage == STAGE_END || e->stage == STAGE_REST))
         join_next();
     /* Until the ring is half full nothing else is as urgent, within reason; then a step at a time. */
     uint8_t rounds = 6;
-    if (playing) {
+    if (e->playing) {
         do {
             if (ring_free() < (block.runs ? RING_REFILL : RING_RESERVE) || !emit())
                 break;
@@ -975,38 +1018,42 @@ NOINLINE bool engine_poll(void)
 
 uint8_t engine_commands_ended(void)
 {
-    return ended;
+    engine_t *e = &engine;
+    return e->ended;
 }
 
 /* A command has been begun (its start wait included) and has not ended. */
 static bool running(void)
 {
+    engine_t *e = &engine;
     look_for_end();
-    return tail_awaited || (playing && (stage == STAGE_LEAD || stage == STAGE_RUN || stage == STAGE_TAIL));
+    return e->tail_awaited || (e->playing && (e->stage == STAGE_LEAD || e->stage == STAGE_RUN || e->stage == STAGE_TAIL));
 }
 
 /* -- stopping ---------------------------------------------------------------------------------------------------- */
 
 static void drop_next(void)
 {
+    engine_t *e = &engine;
     look_for_end();
-    ended = (uint8_t)(ended + next_taken + joined);
-    next_taken = false;
-    joined = false;
+    e->ended = (uint8_t)(e->ended + e->next_taken + e->joined);
+    e->next_taken = false;
+    e->joined = false;
 }
 
 /* Freezes the pulse train where it is. */
 static void halt(void)
 {
-    if (!playing)
+    engine_t *e = HERE;
+    if (!e->playing)
         return;
     step_port_halt();
     if (running())
-        ended++;
-    emitted = engine_position();
-    playing = false;
+        e->ended++;
+    e->emitted = engine_position();
+    e->playing = false;
     drop_emission();
-    stage = STAGE_REST;
+    e->stage = STAGE_REST;
     motion_state = MOTION_STANDBY;
 }
 
@@ -1021,6 +1068,7 @@ void engine_stop(void)
  * (it ends by itself now, or it stands in the middle of a wait or of an interval longer than that of slow speed). */
 static uint32_t cut(void)
 {
+    engine_t *e = &engine;
     allow_hold(0);
     step_snapshot_t at = step_port_snapshot();
     uint8_t offset = (uint8_t)(at.tail - SEGMENT_BYTES);
@@ -1051,7 +1099,7 @@ static uint32_t cut(void)
     if (interval_ticks > basis.slow_ticks + 1)
         return 0;
     int32_t dropped = pulses_from((uint8_t)(offset + SEGMENT_BYTES));
-    emitted -= dropped + signed_pulses(s, step_port_shorten(offset, left));
+    e->emitted -= dropped + signed_pulses(s, step_port_shorten(offset, left));
     drop_emission();
     return interval_ticks;
 }
@@ -1059,6 +1107,7 @@ static uint32_t cut(void)
 /* Ends the running command with a deceleration, or none. */
 static void end_command(accel_code_t decel, bool linear)
 {
+    engine_t *e = &engine;
     if (!running())
         return;
     motion_state_t state = engine_state();
@@ -1066,7 +1115,7 @@ static void end_command(accel_code_t decel, bool linear)
         return; /* ending already */
     uint32_t ticks = state == MOTION_STANDBY ? 0 : cut();
     if (ticks == 0) {
-        if (state == MOTION_STANDBY || stage == STAGE_RUN || silence_chunks || piece_ticks) {
+        if (state == MOTION_STANDBY || e->stage == STAGE_RUN || e->silence_chunks || e->piece_ticks) {
             /* In a start wait or at slow speed: there is nothing to ramp down from. */
             halt();
             forget_velocity();
@@ -1078,8 +1127,8 @@ static void end_command(accel_code_t decel, bool linear)
     profile.cruise.ticks_q8 = (ticks & (PROFILE_CHUNK_TICKS - 1)) << 8;
     if (profile.decel_pulses == 0)
         profile.cruise_pulses = 1; /* the closing interval */
-    ramp_state = MOTION_STANDBY;
-    stage = STAGE_RUN;
+    e->ramp_state = MOTION_STANDBY;
+    e->stage = STAGE_RUN;
 }
 
 void engine_stop_graceful(accel_code_t decel, bool linear)
@@ -1090,15 +1139,17 @@ void engine_stop_graceful(accel_code_t decel, bool linear)
 
 void engine_next(void)
 {
+    engine_t *e = &engine;
     look_for_end();
-    if (!joined) /* else it ends within JOIN_SOON_TICKS */
+    if (!e->joined) /* else it ends within JOIN_SOON_TICKS */
         end_command(ACCEL_NONE, false);
 }
 
 void engine_next_graceful(void)
 {
+    engine_t *e = &engine;
     look_for_end();
-    if (!joined)
+    if (!e->joined)
         end_command(command.decel, (command.flags & MOTION_LINEAR) != 0);
 }
 
@@ -1106,17 +1157,18 @@ void engine_next_graceful(void)
  * as fast as they can be typed at 250,000 Bd. */
 void engine_single_pulse(bool ccw)
 {
-    if (single) {
+    engine_t *e = HERE;
+    if (e->single) {
         step_port_finish();
-    } else if (running() || next_taken) {
+    } else if (running() || e->next_taken) {
         return;
     }
     begin_ring();
-    stage = STAGE_REST;
-    single = true;
+    e->stage = STAGE_REST;
+    e->single = true;
     command.flags = ccw ? MOTION_CCW : 0;
     uint8_t flags = direction_flags(&command, true);
-    append_pulse((uint16_t)(TURN_TICKS + width_ticks), flags);
+    append_pulse((uint16_t)(TURN_TICKS + e->width_ticks), flags);
     play();
 }
 
@@ -1129,13 +1181,14 @@ motion_state_t engine_state(void)
 
 void engine_velocity(uint32_t *rpm, uint32_t *cycle_us)
 {
-    uint32_t v = v_in_play;
-    uint32_t exact_cycle_us = in_play_cycle_us;
+    engine_t *e = HERE;
+    uint32_t v = e->v_in_play;
+    uint32_t exact_cycle_us = e->in_play_cycle_us;
     motion_state_t state = engine_state();
-    if (playing && state == MOTION_CRUISE) {
+    if (e->playing && state == MOTION_CRUISE) {
         exact_cycle_us = profile.cycle_us;
         v = profile_rpm(&basis, &command) * 100u << basis.factor_log2;
-    } else if (playing && (state == MOTION_ACCEL || state == MOTION_DECEL)) {
+    } else if (e->playing && (state == MOTION_ACCEL || state == MOTION_DECEL)) {
         uint8_t offset = (uint8_t)(step_tail - SEGMENT_BYTES);
         if (is_silent(segment_at(offset)))
             offset = (uint8_t)(offset + SEGMENT_BYTES);
@@ -1152,17 +1205,20 @@ void engine_velocity(uint32_t *rpm, uint32_t *cycle_us)
 
 void engine_set_gap(bool on)
 {
-    gap_on = on;
+    engine_t *e = HERE;
+    e->gap_off = !on;
 }
 
 bool engine_gap(void)
 {
-    return gap_on;
+    engine_t *e = HERE;
+    return !e->gap_off;
 }
 
 uint8_t engine_faults(void)
 {
-    return faults;
+    engine_t *e = &engine;
+    return e->faults;
 }
 
 uint32_t command_rpm(const motion_command_t *c)
