@@ -4,13 +4,4 @@
 
 #define NOINLINE __attribute__((noinline))
 
-/* A pointer of which the compiler does not know where it points: on the AVR a member is then reached from a register, in
- * one word, where an address that is known takes two at each access. */
-#define HIDDEN(pointer) \
-    ({ \
-        __typeof__(pointer) hidden = (pointer); \
-        __asm__("" : "+r"(hidden)); \
-        hidden; \
-    })
-
 #endif

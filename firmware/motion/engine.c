@@ -42,7 +42,7 @@ typedef enum {
     STAGE_END,
 } stage_t;
 
-typedef struct {
+static struct {
     uint16_t width_ticks; /* of a pulse */
     bool next_taken;
     bool playing; /* the timer runs (it may play silence) */
@@ -74,9 +74,7 @@ typedef struct {
     uint8_t faults;
     bool gap_off;
     bool single; /* the ring plays single pulses */
-} engine_t;
-
-static engine_t engine;
+} engine;
 static profile_basis_t basis;
 static uint32_t certain_centi;   /* steepest linear ramp whose first interval is longer than AHEAD_LONG_TICKS */
 static motion_command_t command; /* being emitted or played */
@@ -85,16 +83,14 @@ static profile_t profile;        /* what is left of the command to be emitted */
 static ramp_t ramp;
 static block_t block; /* of the phase being emitted, while it has runs left */
 
-#define HERE HIDDEN(&engine)
-
-static bool dir_level(bool ccw)
-{
-    return ccw != (settings.cw_level != 0);
-}
-
 static bool is_ccw(const motion_command_t *c)
 {
     return (c->flags & MOTION_CCW) != 0;
+}
+
+static NOINLINE bool has_no_ramps(const motion_command_t *c)
+{
+    return c->accel == ACCEL_NONE && c->decel == ACCEL_NONE;
 }
 
 /* Segment flags of a command's pulses, and with `turn` those that set the dir pin. */
@@ -103,7 +99,7 @@ static uint8_t direction_flags(const motion_command_t *c, bool turn)
     uint8_t flags = is_ccw(c) ? 1 << SEGMENT_CCW_BIT : 0;
     if (turn) {
         flags |= 1 << SEGMENT_SET_DIR_BIT;
-        if (dir_level(is_ccw(c)))
+        if (is_ccw(c) != (settings.cw_level != 0))
             flags |= 1 << SEGMENT_DIR_BIT;
     }
     return flags;
@@ -111,11 +107,10 @@ static uint8_t direction_flags(const motion_command_t *c, bool turn)
 
 void engine_init(void)
 {
-    engine_t *e = &engine;
     profile_basis(&basis, settings.steps_per_rev, settings.ustep, settings.slow_rpm);
-    e->v_in_play = basis.v_slow;
+    engine.v_in_play = basis.v_slow;
     certain_centi = (130000000u >> basis.factor_log2) / basis.steps_per_rev;
-    e->width_ticks = (uint16_t)settings.pulse_us * TICKS_PER_US;
+    engine.width_ticks = (uint16_t)settings.pulse_us * TICKS_PER_US;
     step_port_init();
 }
 
@@ -176,11 +171,10 @@ static NOINLINE uint8_t pulses_to_come(uint16_t planned)
 
 static void add_pulses(uint8_t flags, uint16_t pulses)
 {
-    engine_t *e = HERE;
     if (flags & (1 << SEGMENT_CCW_BIT))
-        e->emitted -= pulses;
+        engine.emitted -= pulses;
     else
-        e->emitted += pulses;
+        engine.emitted += pulses;
 }
 
 /* Is the one-period segment at `offset` being played, or over? (It is loaded one period before it begins, and what comes
@@ -193,37 +187,42 @@ static bool has_begun(uint8_t offset)
 /* The command whose closing interval has begun its tail has ended. */
 static void look_for_end(void)
 {
-    engine_t *e = HERE;
-    if (e->joined && has_begun(e->joined_offset))
-        e->joined = false;
-    if (e->tail_awaited && has_begun(e->tail_offset)) {
-        e->tail_awaited = false;
-        e->ended++;
+    if (engine.joined && has_begun(engine.joined_offset))
+        engine.joined = false;
+    if (engine.tail_awaited && has_begun(engine.tail_offset)) {
+        engine.tail_awaited = false;
+        engine.ended++;
     }
 }
 
-static NOINLINE uint8_t give(uint32_t *phase, uint8_t pulses)
+/* Takes pulses from the phase, while there are any; returns how many more there should have been. */
+static NOINLINE uint16_t take(uint32_t *phase, uint16_t pulses)
 {
-    uint8_t some = *phase < pulses ? (uint8_t)*phase : pulses;
+    uint16_t some = *phase < pulses ? (uint16_t)*phase : pulses;
     *phase -= some;
-    return (uint8_t)(pulses - some);
+    return (uint16_t)(pulses - some);
+}
+
+/* So many of them in one run. */
+static NOINLINE uint16_t run_of(uint32_t periods)
+{
+    return periods > RUN_MAX_PERIODS ? RUN_MAX_PERIODS : (uint16_t)periods;
 }
 
 /* The interrupt has repeated the last interval because the ring was empty: so many pulses fewer are to be made. */
-static void absorb_held(void)
+static NOINLINE void absorb_held(void)
 {
-    engine_t *e = HERE;
     uint8_t lock = atomic_begin();
     uint8_t held = step_held;
     step_held = 0;
     atomic_end(lock);
-    e->faults |= ENGINE_FAULT_STARVED;
+    engine.faults |= ENGINE_FAULT_STARVED;
     add_pulses(step_flags, held);
     /* The cruise becomes shorter, or, where there is none, the ramps; the closing interval stays. */
     uint32_t left = profile_pulses_left();
     uint8_t given = left > held ? held : left ? (uint8_t)(left - 1) : 0;
-    e->owed = (uint16_t)(e->owed + held - given);
-    give(&profile.decel_pulses, give(&profile.accel_pulses, give(&profile.cruise_pulses, given)));
+    engine.owed = (uint16_t)(engine.owed + held - given);
+    take(&profile.decel_pulses, take(&profile.accel_pulses, take(&profile.cruise_pulses, given)));
 }
 
 /* So many pulses may be repeated from now on if the ring runs empty. */
@@ -249,15 +248,17 @@ static NOINLINE bool settle(uint8_t hold)
  * need an early reload, no more of them than are waited for) are stretched: their count stays exact. */
 static void push(uint16_t periods, uint16_t ticks, bool pulse)
 {
-    engine_t *e = HERE;
     segment_t *s = segment_at(step_head);
-    bool turn = e->dir_due && periods == 1;
-    uint8_t flags = (uint8_t)(e->ramp_state | direction_flags(&command, turn));
-    e->dir_due = e->dir_due && !turn;
+    bool turn = false;
+    if (engine.dir_due && periods == 1) {
+        engine.dir_due = false;
+        turn = true;
+    }
+    uint8_t flags = (uint8_t)(engine.ramp_state | direction_flags(&command, turn));
     settle(pulse ? pulses_to_come(0) : 0);
     if (pulse) {
-        uint16_t given = e->owed < periods ? e->owed : periods;
-        e->owed = (uint16_t)(e->owed - given);
+        uint16_t given = engine.owed < periods ? engine.owed : periods;
+        engine.owed = (uint16_t)(engine.owed - given);
         periods = (uint16_t)(periods - given);
         add_pulses(flags, periods);
     }
@@ -272,7 +273,7 @@ static void push(uint16_t periods, uint16_t ticks, bool pulse)
         top = SEGMENT_EARLY1_BELOW_TICKS - 1;
     }
     s->top = top;
-    s->match = pulse ? (uint16_t)(top - e->width_ticks) : SEGMENT_SILENT;
+    s->match = pulse ? (uint16_t)(top - engine.width_ticks) : SEGMENT_SILENT;
     s->count_low = (uint8_t)periods;
     s->count_high = (uint8_t)((uint16_t)(periods - 1) >> 8);
     s->flags = flags;
@@ -321,9 +322,8 @@ static int32_t pulses_from(uint8_t offset)
 
 int32_t engine_position(void)
 {
-    engine_t *e = HERE;
-    if (!e->playing)
-        return e->emitted;
+    if (!engine.playing)
+        return engine.emitted;
     step_snapshot_t at = step_port_snapshot();
     uint8_t loaded_offset = (uint8_t)(at.tail - SEGMENT_BYTES);
     const segment_t *loaded = segment_at(loaded_offset);
@@ -336,7 +336,7 @@ int32_t engine_position(void)
         to_come += signed_pulses(loaded, (uint16_t)(at.to_count + early_periods(loaded)));
     if (!at.pulse_high && !at.period_over && !step_idle)
         to_come += signed_pulses(running, 1);
-    return e->emitted - to_come;
+    return engine.emitted - to_come;
 }
 
 /* -- emission -------------------------------------------------------------------------------------------------- */
@@ -345,9 +345,8 @@ int32_t engine_position(void)
  * into segments. */
 static void set_interval(uint32_t chunks, int32_t ticks, bool pulse)
 {
-    engine_t *e = HERE;
-    ticks -= e->ahead_ticks;
-    e->ahead_ticks = 0;
+    ticks -= engine.ahead_ticks;
+    engine.ahead_ticks = 0;
     chunks += (uint32_t)(ticks >> PROFILE_CHUNK_LOG2);
     uint16_t piece = (uint16_t)((uint16_t)ticks % PROFILE_CHUNK_TICKS);
     /* No piece too short, and what fits a period is one. */
@@ -355,17 +354,16 @@ static void set_interval(uint32_t chunks, int32_t ticks, bool pulse)
         piece = (uint16_t)(piece + PROFILE_CHUNK_TICKS);
         chunks--;
     }
-    e->silence_chunks = chunks;
-    e->piece_ticks = piece;
-    e->piece_pulse = pulse;
+    engine.silence_chunks = chunks;
+    engine.piece_ticks = piece;
+    engine.piece_pulse = pulse;
 }
 
 /* Adds the carried fraction to a time; what remains is carried on. */
 static NOINLINE uint32_t take_carry(uint32_t ticks, uint16_t frac_q16)
 {
-    engine_t *e = HERE;
-    int32_t carry = e->carry_q16 + frac_q16;
-    e->carry_q16 = carry & 0xFFFF;
+    int32_t carry = engine.carry_q16 + frac_q16;
+    engine.carry_q16 = carry & 0xFFFF;
     return (uint32_t)((int32_t)ticks + (carry >> 16));
 }
 
@@ -381,25 +379,16 @@ static NOINLINE void append(uint16_t periods, uint16_t top, uint16_t width, uint
     step_head = (uint8_t)(step_head + SEGMENT_BYTES);
 }
 
-/* One pulse. */
-static void append_pulse(uint16_t ticks, uint8_t flags)
-{
-    engine_t *e = HERE;
-    append(1, (uint16_t)(ticks - 1), e->width_ticks, flags);
-    add_pulses(flags, 1);
-}
-
 static void append_silence(uint16_t periods, uint16_t top, uint8_t flags)
 {
     append(periods, top, (uint16_t)(top - SEGMENT_SILENT), flags);
 }
 
-static NOINLINE void begin_ramp(motion_state_t state)
+static void begin_ramp(motion_state_t state)
 {
-    engine_t *e = HERE;
-    if (e->ramp_state == state)
+    if (engine.ramp_state == state)
         return;
-    e->ramp_state = state;
+    engine.ramp_state = state;
     if (state == MOTION_ACCEL)
         profile_begin_accel(&profile, &basis, &ramp);
     else
@@ -409,17 +398,15 @@ static NOINLINE void begin_ramp(motion_state_t state)
 /* Does the phase have its longer intervals first? */
 static NOINLINE bool speeds_up(void)
 {
-    engine_t *e = &engine;
-    return e->ramp_state == MOTION_ACCEL && profile.faster;
+    return engine.ramp_state == MOTION_ACCEL && profile.faster;
 }
 
 /* `pulses` intervals of the phase that last `ticks` together: of two neighbouring values. Too few of either kind for an
  * early reload are made like the others, and the difference is carried. */
 static void emit_flat(uint16_t pulses, uint32_t ticks)
 {
-    engine_t *e = &engine;
     if (pulses == 1) {
-        if (ticks > 65535u || e->ahead_ticks)
+        if (ticks > 65535u || engine.ahead_ticks)
             set_interval(0, (int32_t)ticks, true);
         else
             push(1, (uint16_t)ticks, true);
@@ -433,28 +420,25 @@ static void emit_flat(uint16_t pulses, uint32_t ticks)
         longer = 0;
     else if (pulses - longer <= early)
         longer = pulses;
-    e->carry_q16 += (int32_t)(int16_t)(ideal - longer) * 65536;
-    bool first = e->ramp_state == MOTION_CRUISE || speeds_up();
-    if (first && longer)
-        push(longer, (uint16_t)(each + 1), true);
-    if (pulses != longer)
-        push((uint16_t)(pulses - longer), each, true);
-    if (!first && longer)
-        push(longer, (uint16_t)(each + 1), true);
+    engine.carry_q16 += (int32_t)(int16_t)(ideal - longer) * 65536;
+    bool more = engine.ramp_state == MOTION_CRUISE || speeds_up();
+    for (uint8_t kinds = 0; kinds < 2; kinds++, more = !more) {
+        uint16_t some = more ? longer : (uint16_t)(pulses - longer);
+        if (some)
+            push(some, (uint16_t)(each + more), true);
+    }
 }
 
 /* The phase's pulses that may be emitted: the last one of all has the closing interval. */
 static NOINLINE uint32_t pulses_of_phase(void)
 {
-    engine_t *e = &engine;
     uint32_t most = profile_pulses_left() - 1;
-    return *e->phase_left < most ? *e->phase_left : most;
+    return *engine.phase_left < most ? *engine.phase_left : most;
 }
 
 /* Appends what the ring has room for of the block. */
 static void emit_block(void)
 {
-    engine_t *e = HERE;
     uint8_t pulses = block.pulses;
     uint8_t runs = block.runs;
     uint16_t planned = (uint16_t)(runs * pulses);
@@ -465,22 +449,23 @@ static void emit_block(void)
     }
     block_append(&block);
     uint16_t made = (uint16_t)((uint8_t)(runs - block.runs) * pulses);
-    *e->phase_left -= made;
+    take(engine.phase_left, made);
     add_pulses(block.flags, made);
     if (block.runs == 0)
-        e->carry_q16 += (int32_t)(block.shape & BLOCK_SPLIT ? block.carry_q16 : (uint32_t)block.carry_q16 * pulses);
+        engine.carry_q16 += (int32_t)(block.shape & BLOCK_SPLIT ? block.carry_q16 : (uint32_t)block.carry_q16 * pulses);
 }
 
 /* What the block's runs do not say: the ticks carried so far, their segments' flags. */
 static void begin_block(void)
 {
-    engine_t *e = HERE;
-    bool split = block.top_q16 >> 16 >= BLOCK_SPLIT_TICKS - 1;
-    block.shape = (uint8_t)((speeds_up() ? BLOCK_FASTER : 0) | (split ? BLOCK_SPLIT : 0));
+    uint8_t split = block.top_q16 >> 16 >= BLOCK_SPLIT_TICKS - 1 ? BLOCK_SPLIT : 0;
+    block.shape = split;
+    if (speeds_up())
+        block.shape |= BLOCK_FASTER;
     uint32_t carry = 0;
-    if (e->carry_q16 > 0) { /* otherwise it waits for a single interval */
-        carry = (uint32_t)e->carry_q16;
-        e->carry_q16 = 0;
+    if (engine.carry_q16 > 0) { /* otherwise it waits for a single interval */
+        carry = (uint32_t)engine.carry_q16;
+        engine.carry_q16 = 0;
         if (!split || carry > UINT16_MAX) {
             carry /= block.pulses; /* of each interval */
             if (split || carry > UINT16_MAX) { /* left by runs of more pulses */
@@ -490,15 +475,14 @@ static void begin_block(void)
         }
     }
     block.carry_q16 = (uint16_t)carry;
-    block.width_ticks = e->width_ticks;
-    block.flags = (uint8_t)(e->ramp_state | direction_flags(&command, false));
+    block.width_ticks = engine.width_ticks;
+    block.flags = (uint8_t)(engine.ramp_state | direction_flags(&command, false));
 }
 
 /* The next intervals of the ramp of `ramp_state`: pulses all alike, a block, or some of the former before a block. */
 static void emit_ramp(uint32_t at_most)
 {
-    engine_t *e = &engine;
-    if (e->ahead_ticks || e->dir_due || e->owed)
+    if (engine.ahead_ticks || engine.dir_due || engine.owed)
         at_most = 1;
     uint32_t ticks = 0;
     uint8_t pulses = 0;
@@ -513,32 +497,28 @@ static void emit_ramp(uint32_t at_most)
         pulses = (uint8_t)(pulses + group);
         at_most -= group;
     } while (ramp.rest && at_most);
-    *e->phase_left -= pulses;
+    take(engine.phase_left, pulses);
     if (pulses)
         emit_flat(pulses, ticks);
 }
 
 static void emit_cruise(uint32_t at_most)
 {
-    engine_t *e = &engine;
     const profile_interval_t *interval = &profile.cruise;
-    uint32_t ticks = interval->ticks_q8 >> 8;
     uint8_t frac = (uint8_t)interval->ticks_q8;
-    uint32_t chunks = interval->chunks;
-    if (chunks == 1 && ticks < PROFILE_CHUNK_TICKS - 1) {
-        ticks += PROFILE_CHUNK_TICKS;
-        chunks = 0;
-    }
-    if (chunks || e->ahead_ticks) {
-        (*e->phase_left)--;
-        set_interval(chunks, (int32_t)take_carry(ticks, (uint16_t)(frac << 8)), true);
+    if (interval->chunks > 1 || engine.ahead_ticks) {
+        take(engine.phase_left, 1);
+        set_interval(interval->chunks, (int32_t)take_carry(interval->ticks_q8 >> 8, (uint16_t)(frac << 8)), true);
         return;
     }
-    uint16_t run = at_most > RUN_MAX_PERIODS ? RUN_MAX_PERIODS : (uint16_t)at_most;
+    uint16_t ticks = (uint16_t)(interval->ticks_q8 >> 8);
+    if (interval->chunks)
+        ticks = (uint16_t)(ticks + PROFILE_CHUNK_TICKS);
+    uint16_t run = run_of(at_most);
     if (frac == 0 || run < 8) {
-        *e->phase_left -= run;
+        take(engine.phase_left, run);
         uint32_t fraction = (uint32_t)frac * run;
-        emit_flat(run, take_carry(ticks * run + (fraction >> 8), (uint16_t)(fraction << 8)));
+        emit_flat(run, take_carry((uint32_t)ticks * run + (fraction >> 8), (uint16_t)(fraction << 8)));
         return;
     }
     /* Runs of two neighbouring values. */
@@ -550,7 +530,7 @@ static void emit_cruise(uint32_t at_most)
     }
     block.runs = (uint8_t)(run > 255u ? 255u : run);
     block.pulses = pulses;
-    block.top_q16 = ((ticks - 1) << 16) | (uint32_t)frac << 8;
+    block.top_q16 = (uint32_t)(ticks - 1u) << 16 | (uint16_t)(frac << 8);
     block.slope_q16 = 0;
     block.curve_q16 = 0;
     begin_block();
@@ -559,11 +539,10 @@ static void emit_cruise(uint32_t at_most)
 /* The interval after the last pulse of the command, which is of this phase: body, then tail. */
 static void begin_closing(void)
 {
-    engine_t *e = HERE;
     profile_t *p = &profile;
     ramp_time_t last;
     uint32_t chunks = 0;
-    if (e->ramp_state == MOTION_CRUISE) {
+    if (engine.ramp_state == MOTION_CRUISE) {
         chunks = p->cruise.chunks;
         last.ticks = p->cruise.ticks_q8 >> 8;
         last.frac_q16 = (uint16_t)(p->cruise.ticks_q8 << 8);
@@ -573,68 +552,56 @@ static void begin_closing(void)
     uint32_t ticks = take_carry(last.ticks, last.frac_q16);
     chunks += ticks >> PROFILE_CHUNK_LOG2;
     ticks &= PROFILE_CHUNK_TICKS - 1;
-    *e->phase_left = 0;
-    e->closing_chunks = chunks;
-    e->closing_ticks = (uint16_t)ticks;
-    e->tail_ticks = TAIL_TICKS;
+    *engine.phase_left = 0;
+    engine.closing_chunks = chunks;
+    engine.closing_ticks = (uint16_t)ticks;
+    engine.tail_ticks = TAIL_TICKS;
     if (chunks || ticks >= 2 * TAIL_TICKS)
         set_interval(chunks, (int32_t)(ticks - TAIL_TICKS), false);
     else
-        e->tail_ticks = (uint16_t)ticks;
-    e->tail_fast = e->tail_ticks < SEGMENT_EARLY1_BELOW_TICKS;
-    if (e->tail_fast)
-        e->tail_ticks = SHORTEST_PIECE_TICKS;
-    e->stage = STAGE_TAIL;
+        engine.tail_ticks = (uint16_t)ticks;
+    engine.tail_fast = engine.tail_ticks < SEGMENT_EARLY1_BELOW_TICKS;
+    if (engine.tail_fast)
+        engine.tail_ticks = SHORTEST_PIECE_TICKS;
+    engine.stage = STAGE_TAIL;
 }
 
 static void push_tail(void)
 {
-    engine_t *e = HERE;
-    e->tail_offset = step_head;
-    e->ramp_state = MOTION_STOP;
-    push(1, e->tail_ticks, false);
-    e->tail_awaited = true;
+    engine.tail_offset = step_head;
+    engine.ramp_state = MOTION_STOP;
+    push(1, engine.tail_ticks, false);
+    engine.tail_awaited = true;
 }
 
 /* What comes next, but for a block, which is only begun. False if there is nothing. */
 static bool emit_other(void)
 {
-    engine_t *e = HERE;
-    if (e->silence_chunks) {
-        uint16_t periods = e->silence_chunks > RUN_MAX_PERIODS ? RUN_MAX_PERIODS : (uint16_t)e->silence_chunks;
-        e->silence_chunks -= periods;
+    if (engine.silence_chunks) {
+        uint16_t periods = run_of(engine.silence_chunks);
+        take(&engine.silence_chunks, periods);
         push(periods, PROFILE_CHUNK_TICKS, false);
         return true;
     }
-    if (e->piece_ticks) {
-        uint16_t ticks = e->piece_ticks;
-        e->piece_ticks = 0;
-        push(1, ticks, e->piece_pulse);
+    if (engine.piece_ticks) {
+        uint16_t ticks = engine.piece_ticks;
+        engine.piece_ticks = 0;
+        push(1, ticks, engine.piece_pulse);
         return true;
     }
     profile_t *p = &profile;
-    switch (e->stage) {
-    case STAGE_REST:
-        return false;
-    case STAGE_LEAD: {
-        /* The start wait, then the first pulse. */
-        uint32_t us = command.start_wait_us;
-        e->ramp_state = MOTION_STANDBY;
-        set_interval(us >> PROFILE_CHUNK_US_LOG2, (int32_t)((uint16_t)us % PROFILE_CHUNK_US * TICKS_PER_US), true);
-        e->stage = STAGE_RUN;
-        break;
-    }
-    case STAGE_RUN: {
+    stage_t stage = engine.stage;
+    if (stage == STAGE_RUN) {
         motion_state_t state = MOTION_ACCEL;
         uint32_t *left = &p->accel_pulses;
         while (*left == 0 && state != MOTION_DECEL) {
             left++; /* cruise, deceleration */
             state++;
         }
-        e->phase_left = left;
+        engine.phase_left = left;
         uint32_t at_most = pulses_of_phase();
         if (state == MOTION_CRUISE)
-            e->ramp_state = MOTION_CRUISE;
+            engine.ramp_state = state;
         else
             begin_ramp(state);
         if (at_most == 0)
@@ -643,26 +610,27 @@ static bool emit_other(void)
             emit_cruise(at_most);
         else
             emit_ramp(at_most);
-        break;
+        return true;
     }
-    case STAGE_TAIL:
+    if (stage == STAGE_REST || (stage == STAGE_GAP && engine.next_taken))
+        return false; /* (it will be joined) */
+    engine.stage = (stage_t)(stage + 1);
+    if (stage == STAGE_LEAD) {
+        /* The start wait, then the first pulse. */
+        uint32_t us = command.start_wait_us;
+        engine.ramp_state = MOTION_STANDBY;
+        set_interval(us >> PROFILE_CHUNK_US_LOG2, (uint16_t)us % PROFILE_CHUNK_US * TICKS_PER_US, true);
+    } else if (stage == STAGE_TAIL) {
         push_tail();
-        e->v_in_play = p->v_exit;
-        e->in_play_cycle_us = p->exit_cycle_us;
-        e->stage = STAGE_GAP;
-        break;
-    case STAGE_GAP:
-        if (e->next_taken)
-            return false; /* it will be joined */
-        e->ramp_state = MOTION_STANDBY;
-        if (!e->gap_off)
-            set_interval(e->closing_chunks, e->tail_fast ? e->tail_ticks : e->closing_ticks, false);
-        e->stage = STAGE_END;
-        break;
-    case STAGE_END:
+        engine.v_in_play = p->v_exit;
+        engine.in_play_cycle_us = p->exit_cycle_us;
+    } else if (stage == STAGE_GAP) {
+        engine.ramp_state = MOTION_STANDBY;
+        if (!engine.gap_off)
+            set_interval(engine.closing_chunks, engine.tail_fast ? engine.tail_ticks : engine.closing_ticks, false);
+    } else {
         push(1, SHORTEST_PIECE_TICKS, false);
-        e->stage = STAGE_REST;
-        break;
+        engine.stage = STAGE_REST;
     }
     return true;
 }
@@ -682,60 +650,54 @@ static bool emit(void)
 /* Nothing of the command is to be emitted any more, or joined to. */
 static void drop_emission(void)
 {
-    engine_t *e = HERE;
-    e->silence_chunks = 0;
-    e->piece_ticks = 0;
+    engine.silence_chunks = 0;
+    engine.piece_ticks = 0;
     block.runs = 0;
-    e->ahead_ticks = 0;
-    e->ramp_state = MOTION_STANDBY;
-    e->tail_awaited = false;
+    engine.ahead_ticks = 0;
+    engine.ramp_state = MOTION_STANDBY;
+    engine.tail_awaited = false;
 }
 
 /* -- starting and joining ----------------------------------------------------------------------------------------- */
 
 static void begin_ring(void)
 {
-    engine_t *e = &engine;
-    if (e->playing)
+    if (engine.playing)
         step_port_halt();
-    e->playing = false;
+    engine.playing = false;
     step_head = step_tail = 0;
     step_hold = 0;
     step_held = 0;
     step_idle = 0;
-    e->owed = 0;
-    e->carry_q16 = 0;
-    e->dir_due = false;
-    e->joined = false;
-    e->single = false;
+    engine.owed = 0;
+    engine.carry_q16 = 0;
+    engine.dir_due = false;
+    engine.joined = false;
+    engine.single = false;
     drop_emission();
 }
 
 static void forget_velocity(void)
 {
-    engine_t *e = HERE;
-    e->v_in_play = basis.v_slow;
-    e->in_play_cycle_us = 0;
+    engine.v_in_play = basis.v_slow;
+    engine.in_play_cycle_us = 0;
 }
 
 /* Is the velocity in play kept until now? */
 static void expire_gap(void)
 {
-    engine_t *e = &engine;
-    if (!e->gap_off)
+    if (!engine.gap_off)
         forget_velocity();
 }
 
 static void plan(void)
 {
-    engine_t *e = HERE;
-    profile_plan(&profile, &basis, &command, e->v_in_play);
+    profile_plan(&profile, &basis, &command, engine.v_in_play);
 }
 
 static NOINLINE void play(void)
 {
-    engine_t *e = &engine;
-    e->playing = true;
+    engine.playing = true;
     step_port_start();
 }
 
@@ -743,45 +705,44 @@ static NOINLINE void play(void)
  * the planning. Returns how much of that interval may certainly be begun, from few operations; 0: plan first. */
 static uint16_t certain_ticks(void)
 {
-    engine_t *e = HERE;
-    if (e->v_in_play != basis.v_slow)
+    uint32_t velocity = command.velocity;
+    bool is_cycle = command.flags & MOTION_CYCLE;
+    if (engine.v_in_play != basis.v_slow)
         return 0;
+    uint16_t ahead = AHEAD_LONG_TICKS;
     if (command.accel == ACCEL_NONE) { /* the cruise interval, or that of the deceleration */
-        uint16_t flat = command.decel == ACCEL_NONE ? AHEAD_SHORT_TICKS : AHEAD_LONG_TICKS;
-        return command.flags & MOTION_CYCLE && command.velocity >> basis.factor_log2 >= flat / 8 ? flat : 0;
+        if (command.decel == ACCEL_NONE)
+            ahead = AHEAD_SHORT_TICKS;
+        return is_cycle && velocity >> basis.factor_log2 >= ahead / 8 ? ahead : 0;
     }
     if (basis.slow_ticks < AHEAD_TICKS + SHORTEST_PIECE_TICKS)
         return 0;
-    uint16_t least_rpm;
-    uint16_t ahead = AHEAD_TICKS;
+    uint16_t least_rpm = 100;
     uint32_t accel = accel_centi(command.accel);
     if (!(command.flags & MOTION_LINEAR)) {
         /* At least one step of acceleration, at slow speed. */
         least_rpm = (uint16_t)(settings.slow_rpm + 2u + (uint16_t)(accel >> 6));
-        if (basis.slow_ticks >= AHEAD_LONG_TICKS + SHORTEST_PIECE_TICKS)
-            ahead = AHEAD_LONG_TICKS;
-    } else {
+        if (basis.slow_ticks < AHEAD_LONG_TICKS + SHORTEST_PIECE_TICKS)
+            ahead = AHEAD_TICKS;
+    } else if (basis.steps_per_rev < 200 || accel > certain_centi || command.accel > command.decel) {
         /* c0 = sqrt(3.217e17 / (sprf * F * centi)) ticks is long enough; at least one step from 100 RPM on with 200 steps
          * and more, and no less of acceleration than of deceleration in a truncated profile. */
-        least_rpm = basis.steps_per_rev >= 200 && accel <= certain_centi && command.accel <= command.decel ? 100 : 65535;
-        ahead = AHEAD_LONG_TICKS;
+        return 0;
     }
-    uint32_t velocity = command.velocity;
-    bool fast = command.flags & MOTION_CYCLE ? velocity < 65536u && velocity * least_rpm <= basis.us_rpm
-                                             : velocity >= least_rpm;
-    return fast ? ahead : 0;
+    if (is_cycle ? velocity > UINT16_MAX || velocity * least_rpm > basis.us_rpm : velocity < least_rpm)
+        return 0;
+    return ahead;
 }
 
 /* Emits enough to be played until the next round of the main loop, and where a ramp begins steeply, before the timer
  * runs, until the intervals that are slow to plan, one by one, are over. */
 static void fill(void)
 {
-    engine_t *e = HERE;
     uint32_t ticks = 0;
     uint16_t periods = 0;
     uint8_t offset = step_head;
     while ((ticks < START_TICKS || periods < START_PERIODS ||
-            (!e->playing && (e->ramp_state == MOTION_ACCEL || e->ramp_state == MOTION_DECEL) &&
+            (!engine.playing && (engine.ramp_state == MOTION_ACCEL || engine.ramp_state == MOTION_DECEL) &&
              (ramp.steep > 1 || ramp.group_log2 == 0))) &&
            ring_free() >= RING_RESERVE && emit()) {
         uint16_t first = counted_periods(segment_at(offset));
@@ -795,21 +756,23 @@ static void fill(void)
  * last for long enough. Emits them and returns how many; 0: plan first. */
 static uint16_t begin_cruise(void)
 {
-    engine_t *e = HERE;
-    uint8_t factor_log2 = basis.factor_log2;
-    if (command.accel != ACCEL_NONE || command.decel != ACCEL_NONE)
+    if (!has_no_ramps(&command))
         return 0;
     uint32_t cycle_us = profile_cycle_us(&basis, &command);
-    uint16_t ticks = (uint16_t)(cycle_us * TICKS_PER_US);
-    if (cycle_us > UINT16_MAX / TICKS_PER_US || ticks & ((1u << factor_log2) - 1))
+    if (cycle_us > UINT16_MAX / TICKS_PER_US)
         return 0;
-    ticks = (uint16_t)(ticks >> factor_log2);
+    uint16_t ticks = (uint16_t)(cycle_us * TICKS_PER_US);
+    for (uint8_t halvings = basis.factor_log2; halvings; halvings--) {
+        if (ticks & 1)
+            return 0;
+        ticks /= 2;
+    }
     uint32_t pulses = command.count - 1; /* at least: full steps have more */
-    uint16_t run = pulses > RUN_MAX_PERIODS ? RUN_MAX_PERIODS : (uint16_t)pulses;
+    uint16_t run = run_of(pulses);
     if ((uint32_t)run * ticks < START_TICKS)
         return 0;
     profile.accel_pulses = profile.cruise_pulses = profile.decel_pulses = 0;
-    e->ramp_state = MOTION_CRUISE;
+    engine.ramp_state = MOTION_CRUISE;
     push(run, ticks, true);
     play();
     return run;
@@ -818,27 +781,28 @@ static uint16_t begin_cruise(void)
 /* Starts a command, which is not planned yet, from standstill. */
 static void start(const motion_command_t *c)
 {
-    engine_t *e = &engine;
     begin_ring();
     command = *c;
-    e->next_taken = false;
-    step_port_dir(dir_level(is_ccw(&command)));
-    uint8_t flags = direction_flags(&command, false);
+    engine.next_taken = false;
+    uint8_t flags = direction_flags(&command, true);
+    step_port_dir(flags & 1 << SEGMENT_DIR_BIT);
+    flags &= 1 << SEGMENT_CCW_BIT;
     uint16_t cruised = 0;
-    e->stage = STAGE_LEAD;
+    engine.stage = STAGE_LEAD;
     if (command.start_wait_us < 4096u) {
         uint16_t lead = (uint16_t)(command.start_wait_us * TICKS_PER_US);
-        uint16_t least = (uint16_t)(DIR_SETUP_TICKS + e->width_ticks);
-        append_pulse(lead < least ? least : lead, flags);
-        e->stage = STAGE_RUN;
-        e->ahead_ticks = certain_ticks();
-        if (e->ahead_ticks) {
+        uint16_t least = (uint16_t)(DIR_SETUP_TICKS + engine.width_ticks);
+        append(1, (uint16_t)((lead < least ? least : lead) - 1), engine.width_ticks, flags);
+        engine.stage = STAGE_RUN;
+        engine.ahead_ticks = certain_ticks();
+        if (engine.ahead_ticks) {
             flags = (uint8_t)(flags | (command.accel == ACCEL_NONE ? MOTION_CRUISE : MOTION_ACCEL));
-            append_silence(AHEAD_PERIODS, (uint16_t)(e->ahead_ticks / AHEAD_PERIODS - 1), flags);
+            append_silence(AHEAD_PERIODS, (uint16_t)(engine.ahead_ticks / AHEAD_PERIODS - 1), flags);
             play();
         } else {
             cruised = begin_cruise();
         }
+        add_pulses(flags, 1);
     } else {
         emit(); /* sets the interval up, then its silence, then the pulse */
         emit();
@@ -848,7 +812,7 @@ static void start(const motion_command_t *c)
     plan();
     profile.cruise_pulses -= cruised;
     fill();
-    if (!e->playing)
+    if (!engine.playing)
         play();
 }
 
@@ -858,62 +822,45 @@ static uint32_t wait_ticks(uint32_t us)
     return us < UINT32_MAX / TICKS_PER_US ? us * TICKS_PER_US : UINT32_MAX;
 }
 
-/* Ticks until the tail begins, or more than JOIN_SOON_TICKS; 0: it has begun. */
-static uint32_t ticks_to_tail(void)
-{
-    engine_t *e = HERE;
-    step_snapshot_t at = step_port_snapshot();
-    uint8_t offset = (uint8_t)(at.tail - SEGMENT_BYTES);
-    look_for_end();
-    if (!e->tail_awaited)
-        return 0;
-    if (offset == e->tail_offset) {
-        /* It is loaded: what is left of the period before it. */
-        uint16_t top = segment_at((uint8_t)(offset - SEGMENT_BYTES))->top;
-        uint16_t counter = step_port_counter();
-        return at.period_over || counter > top ? 0 : top - counter;
-    }
-    return ticks_between(offset, at.to_count, e->tail_offset);
-}
-
-/* Has the segment after the tail begun? (An idle timer is dealt with by engine_poll.) */
-static bool tail_is_over(void)
-{
-    engine_t *e = HERE;
-    step_snapshot_t at = step_port_snapshot();
-    uint8_t loaded = (uint8_t)(at.tail - SEGMENT_BYTES);
-    if (step_idle || !has_begun(e->tail_offset))
-        return false;
-    return loaded != (uint8_t)(e->tail_offset + SEGMENT_BYTES) || at.to_count != counted_periods(segment_at(loaded));
-}
-
 /* Lets the command in `next` follow the one that has been emitted: exactly one interval after its last pulse where there
  * is time to plan it and to emit its first intervals, otherwise as soon as possible after its end. Not long before, so
  * that the running command can still be cut without the next one. */
 static void join_next(void)
 {
-    engine_t *e = HERE;
-    uint32_t ticks = ticks_to_tail();
-    if (ticks > JOIN_SOON_TICKS)
-        return; /* later */
-    uint16_t needed = next.flags & MOTION_LINEAR ? JOIN_LINEAR_TICKS : JOIN_TICKS;
-    if (next.accel == ACCEL_NONE && next.decel == ACCEL_NONE)
-        needed = JOIN_FLAT_TICKS;
-    if (ticks < needed) {
-        if (tail_is_over()) { /* else at its end */
-            if (step_idle)
-                expire_gap();
+    step_snapshot_t at = step_port_snapshot();
+    uint8_t loaded = (uint8_t)(at.tail - SEGMENT_BYTES);
+    uint8_t offset = engine.tail_offset;
+    look_for_end();
+    if (!engine.tail_awaited) {
+        /* Not before the segment after the tail has begun. (An idle timer is dealt with by engine_poll.) */
+        uint8_t distance = (uint8_t)(loaded - offset);
+        bool waits = distance == SEGMENT_BYTES && at.to_count == counted_periods(segment_at(loaded));
+        if (!step_idle && has_begun(offset) && distance != 0 && !waits)
             start(&next);
-        }
         return;
     }
+    uint32_t ticks; /* until the tail begins */
+    if (loaded == offset) {
+        /* It is loaded: what is left of the period before it. */
+        uint16_t top = segment_at((uint8_t)(offset - SEGMENT_BYTES))->top;
+        uint16_t counter = step_port_counter();
+        if (at.period_over || counter > top)
+            return;
+        ticks = top - counter;
+    } else {
+        ticks = ticks_between(loaded, at.to_count, offset);
+    }
+    uint16_t needed = next.flags & MOTION_LINEAR ? JOIN_LINEAR_TICKS : JOIN_TICKS;
+    if (has_no_ramps(&next))
+        needed = JOIN_FLAT_TICKS;
+    if (ticks > JOIN_SOON_TICKS || ticks < needed)
+        return; /* later, or after its end */
     bool turns = is_ccw(&next) != is_ccw(&command);
     uint32_t wait = wait_ticks(next.start_wait_us);
     bool waits = wait >= SHORTEST_PIECE_TICKS;
     uint8_t flags = (uint8_t)(MOTION_STOP | direction_flags(&next, turns));
-    uint8_t offset = e->tail_offset;
     bool done;
-    if (e->tail_fast && !turns && wait == 0) {
+    if (engine.tail_fast && !turns && wait == 0) {
         offset = (uint8_t)(offset - SEGMENT_BYTES); /* the last run */
         done = step_port_extend(offset);
     } else {
@@ -924,29 +871,31 @@ static void join_next(void)
             flags = tail->flags;
         } else {
             top = (uint16_t)(top + wait);
-            if (turns && top < TURN_TICKS + e->width_ticks)
-                top = (uint16_t)(TURN_TICKS + e->width_ticks);
-            match = (uint16_t)(top - e->width_ticks);
+            if (turns && top < TURN_TICKS + engine.width_ticks)
+                top = (uint16_t)(TURN_TICKS + engine.width_ticks);
+            match = (uint16_t)(top - engine.width_ticks);
         }
         done = step_port_arm(offset, top, match, flags);
     }
     if (!done)
         return; /* not at this moment */
-    e->joined_offset = offset;
+    engine.joined_offset = offset;
     command = next;
-    e->next_taken = false;
+    engine.next_taken = false;
     drop_emission();
-    e->joined = true;
-    e->ended++;
+    engine.joined = true;
+    engine.ended++;
     /* Longer than the gap the wait means a start from slow speed. */
-    if (wait >> PROFILE_CHUNK_LOG2 >= e->closing_chunks && wait > (e->closing_chunks << PROFILE_CHUNK_LOG2) + e->closing_ticks)
+    uint32_t chunks = wait >> PROFILE_CHUNK_LOG2;
+    if (chunks > engine.closing_chunks ||
+        (chunks == engine.closing_chunks && (uint16_t)wait % PROFILE_CHUNK_TICKS > engine.closing_ticks))
         expire_gap();
     if (waits) {
-        e->dir_due = turns;
-        e->stage = STAGE_LEAD;
+        engine.dir_due = turns;
+        engine.stage = STAGE_LEAD;
     } else {
         add_pulses(flags, 1);
-        e->stage = STAGE_RUN;
+        engine.stage = STAGE_RUN;
     }
     plan();
     fill();
@@ -959,56 +908,54 @@ status_t engine_check(const motion_command_t *c)
 
 bool engine_can_accept(void)
 {
-    engine_t *e = &engine;
-    return !e->next_taken;
+    return !engine.next_taken;
 }
 
 void engine_submit(const motion_command_t *submitted)
 {
-    engine_t *e = HERE;
-    if (!e->playing) {
+    if (!engine.playing) {
         start(submitted);
     } else {
         next = *submitted;
-        e->next_taken = true;
+        engine.next_taken = true;
     }
 }
 
 NOINLINE bool engine_poll(void)
 {
-    engine_t *e = &engine;
     bool worked = false;
     look_for_end();
     if (step_late) {
         step_late = 0;
-        e->faults |= ENGINE_FAULT_LATE;
+        engine.faults |= ENGINE_FAULT_LATE;
     }
-    if (e->playing && step_idle) {
+    if (engine.playing && step_idle) {
         if (!step_port_snapshot().period_over) {
             /* The last period is not over. */
-        } else if ((e->stage == STAGE_REST || e->stage == STAGE_GAP) && step_head == step_tail) {
+        } else if ((engine.stage == STAGE_REST || engine.stage == STAGE_GAP) && step_head == step_tail) {
             step_port_halt();
-            e->playing = false;
-            e->single = false;
-            if (e->next_taken)
+            engine.playing = false;
+            engine.single = false;
+            if (engine.next_taken)
                 start(&next);
             else
                 expire_gap();
         } else if (step_head != step_tail) {
             /* The planner was so late that the timer ran out of segments: go on where it stopped. */
-            if (e->stage == STAGE_RUN)
-                e->faults |= ENGINE_FAULT_STARVED;
+            if (engine.stage == STAGE_RUN)
+                engine.faults |= ENGINE_FAULT_STARVED;
             step_port_start();
         }
         worked = true;
     }
-    if (e->next_taken && e->playing && !e->single && (e->stage == STAGE_GAP || e->stage == STAGE_END || e->stage == STAGE_REST))
+    if (engine.next_taken && engine.playing && !engine.single && (engine.stage == STAGE_GAP || engine.stage == STAGE_END || engine.stage == STAGE_REST))
         join_next();
     /* Until the ring is half full nothing else is as urgent, within reason; then a step at a time. */
     uint8_t rounds = 6;
-    if (e->playing) {
+    if (engine.playing) {
         do {
-            if (ring_free() < (block.runs ? RING_REFILL : RING_RESERVE) || !emit())
+            uint8_t least = block.runs ? RING_REFILL : RING_RESERVE;
+            if (ring_free() < least || !emit())
                 break;
             worked = true;
         } while (ring_free() > SEGMENT_COUNT / 2 && --rounds);
@@ -1018,42 +965,38 @@ NOINLINE bool engine_poll(void)
 
 uint8_t engine_commands_ended(void)
 {
-    engine_t *e = &engine;
-    return e->ended;
+    return engine.ended;
 }
 
 /* A command has been begun (its start wait included) and has not ended. */
 static bool running(void)
 {
-    engine_t *e = &engine;
     look_for_end();
-    return e->tail_awaited || (e->playing && (e->stage == STAGE_LEAD || e->stage == STAGE_RUN || e->stage == STAGE_TAIL));
+    return engine.tail_awaited || (engine.playing && (engine.stage == STAGE_LEAD || engine.stage == STAGE_RUN || engine.stage == STAGE_TAIL));
 }
 
 /* -- stopping ---------------------------------------------------------------------------------------------------- */
 
 static void drop_next(void)
 {
-    engine_t *e = &engine;
     look_for_end();
-    e->ended = (uint8_t)(e->ended + e->next_taken + e->joined);
-    e->next_taken = false;
-    e->joined = false;
+    engine.ended = (uint8_t)(engine.ended + engine.next_taken + engine.joined);
+    engine.next_taken = false;
+    engine.joined = false;
 }
 
 /* Freezes the pulse train where it is. */
 static void halt(void)
 {
-    engine_t *e = HERE;
-    if (!e->playing)
+    if (!engine.playing)
         return;
     step_port_halt();
     if (running())
-        e->ended++;
-    e->emitted = engine_position();
-    e->playing = false;
+        engine.ended++;
+    engine.emitted = engine_position();
+    engine.playing = false;
     drop_emission();
-    e->stage = STAGE_REST;
+    engine.stage = STAGE_REST;
     motion_state = MOTION_STANDBY;
 }
 
@@ -1068,7 +1011,6 @@ void engine_stop(void)
  * (it ends by itself now, or it stands in the middle of a wait or of an interval longer than that of slow speed). */
 static uint32_t cut(void)
 {
-    engine_t *e = &engine;
     allow_hold(0);
     step_snapshot_t at = step_port_snapshot();
     uint8_t offset = (uint8_t)(at.tail - SEGMENT_BYTES);
@@ -1099,7 +1041,7 @@ static uint32_t cut(void)
     if (interval_ticks > basis.slow_ticks + 1)
         return 0;
     int32_t dropped = pulses_from((uint8_t)(offset + SEGMENT_BYTES));
-    e->emitted -= dropped + signed_pulses(s, step_port_shorten(offset, left));
+    engine.emitted -= dropped + signed_pulses(s, step_port_shorten(offset, left));
     drop_emission();
     return interval_ticks;
 }
@@ -1107,7 +1049,6 @@ static uint32_t cut(void)
 /* Ends the running command with a deceleration, or none. */
 static void end_command(accel_code_t decel, bool linear)
 {
-    engine_t *e = &engine;
     if (!running())
         return;
     motion_state_t state = engine_state();
@@ -1115,7 +1056,7 @@ static void end_command(accel_code_t decel, bool linear)
         return; /* ending already */
     uint32_t ticks = state == MOTION_STANDBY ? 0 : cut();
     if (ticks == 0) {
-        if (state == MOTION_STANDBY || e->stage == STAGE_RUN || e->silence_chunks || e->piece_ticks) {
+        if (state == MOTION_STANDBY || engine.stage == STAGE_RUN || engine.silence_chunks || engine.piece_ticks) {
             /* In a start wait or at slow speed: there is nothing to ramp down from. */
             halt();
             forget_velocity();
@@ -1127,8 +1068,8 @@ static void end_command(accel_code_t decel, bool linear)
     profile.cruise.ticks_q8 = (ticks & (PROFILE_CHUNK_TICKS - 1)) << 8;
     if (profile.decel_pulses == 0)
         profile.cruise_pulses = 1; /* the closing interval */
-    e->ramp_state = MOTION_STANDBY;
-    e->stage = STAGE_RUN;
+    engine.ramp_state = MOTION_STANDBY;
+    engine.stage = STAGE_RUN;
 }
 
 void engine_stop_graceful(accel_code_t decel, bool linear)
@@ -1139,17 +1080,15 @@ void engine_stop_graceful(accel_code_t decel, bool linear)
 
 void engine_next(void)
 {
-    engine_t *e = &engine;
     look_for_end();
-    if (!e->joined) /* else it ends within JOIN_SOON_TICKS */
+    if (!engine.joined) /* else it ends within JOIN_SOON_TICKS */
         end_command(ACCEL_NONE, false);
 }
 
 void engine_next_graceful(void)
 {
-    engine_t *e = &engine;
     look_for_end();
-    if (!e->joined)
+    if (!engine.joined)
         end_command(command.decel, (command.flags & MOTION_LINEAR) != 0);
 }
 
@@ -1157,18 +1096,19 @@ void engine_next_graceful(void)
  * as fast as they can be typed at 250,000 Bd. */
 void engine_single_pulse(bool ccw)
 {
-    engine_t *e = HERE;
-    if (e->single) {
+    if (engine.single) {
         step_port_finish();
-    } else if (running() || e->next_taken) {
+    } else if (running() || engine.next_taken) {
         return;
     }
     begin_ring();
-    e->stage = STAGE_REST;
-    e->single = true;
+    engine.stage = STAGE_REST;
+    engine.single = true;
     command.flags = ccw ? MOTION_CCW : 0;
     uint8_t flags = direction_flags(&command, true);
-    append_pulse((uint16_t)(TURN_TICKS + e->width_ticks), flags);
+    uint16_t width = engine.width_ticks;
+    append(1, (uint16_t)(TURN_TICKS + width - 1), width, flags);
+    add_pulses(flags, 1);
     play();
 }
 
@@ -1181,14 +1121,13 @@ motion_state_t engine_state(void)
 
 void engine_velocity(uint32_t *rpm, uint32_t *cycle_us)
 {
-    engine_t *e = HERE;
-    uint32_t v = e->v_in_play;
-    uint32_t exact_cycle_us = e->in_play_cycle_us;
+    uint32_t v = engine.v_in_play;
+    uint32_t exact_cycle_us = engine.in_play_cycle_us;
     motion_state_t state = engine_state();
-    if (e->playing && state == MOTION_CRUISE) {
+    if (engine.playing && state == MOTION_CRUISE) {
         exact_cycle_us = profile.cycle_us;
         v = profile_rpm(&basis, &command) * 100u << basis.factor_log2;
-    } else if (e->playing && (state == MOTION_ACCEL || state == MOTION_DECEL)) {
+    } else if (engine.playing && (state == MOTION_ACCEL || state == MOTION_DECEL)) {
         uint8_t offset = (uint8_t)(step_tail - SEGMENT_BYTES);
         if (is_silent(segment_at(offset)))
             offset = (uint8_t)(offset + SEGMENT_BYTES);
@@ -1205,20 +1144,17 @@ void engine_velocity(uint32_t *rpm, uint32_t *cycle_us)
 
 void engine_set_gap(bool on)
 {
-    engine_t *e = HERE;
-    e->gap_off = !on;
+    engine.gap_off = !on;
 }
 
 bool engine_gap(void)
 {
-    engine_t *e = HERE;
-    return !e->gap_off;
+    return !engine.gap_off;
 }
 
 uint8_t engine_faults(void)
 {
-    engine_t *e = &engine;
-    return e->faults;
+    return engine.faults;
 }
 
 uint32_t command_rpm(const motion_command_t *c)
