@@ -190,8 +190,9 @@ bool step_port_arm(uint8_t offset, uint16_t top, uint16_t match, uint8_t flags)
     uint16_t before_top = segment_at((uint8_t)(offset - SEGMENT_BYTES))->top;
     uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
     uint8_t state = atomic_begin();
-    uint8_t distance = (uint8_t)(after - step_tail);
-    bool done = distance != 0 && distance <= (uint8_t)(step_head - step_tail);
+    uint8_t tail = step_tail;
+    uint8_t distance = (uint8_t)(after - tail);
+    bool done = (uint8_t)(distance - 1) < (uint8_t)(step_head - tail);
     if (before_top >= ARM_LEAST_TICKS && distance == 0 && !step_idle && !(TIFR1 & 1 << TOV1) &&
         (uint16_t)(TCNT1 + ARM_TICKS) < before_top) {
         /* Loaded, but the period before it is still running: into the buffers. */
@@ -233,19 +234,6 @@ bool step_port_extend(uint8_t offset)
     atomic_end(state);
     if (done)
         set_less_one(s, extended);
-    return done;
-}
-
-bool step_port_drop_after(uint8_t offset)
-{
-    uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
-    bool done = false;
-    uint8_t state = atomic_begin();
-    if ((uint8_t)(after - step_tail) <= (uint8_t)(step_head - step_tail)) {
-        step_head = after;
-        done = true;
-    }
-    atomic_end(state);
     return done;
 }
 

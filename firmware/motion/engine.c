@@ -10,6 +10,8 @@
 #include "settings.h"
 
 #define TICKS_PER_US 16u
+#define PROFILE_CHUNK_US_LOG2 (PROFILE_CHUNK_LOG2 - 4)
+#define PROFILE_CHUNK_US (1u << PROFILE_CHUNK_US_LOG2)
 #define DIR_SETUP_TICKS 80u      /* dir before the first pulse: 5 us, the slowest common drivers ask for it */
 #define TURN_TICKS (DIR_SETUP_TICKS + 100u) /* the same where the step interrupt sets dir: its latency and cycles */
 #define TAIL_TICKS 320u          /* the end of the closing interval, on which a following command is joined */
@@ -40,53 +42,70 @@ typedef enum {
     STAGE_END,
 } stage_t;
 
+static struct {
+    uint16_t width_ticks; /* of a pulse */
+    const motion_command_t *next; /* offered, not begun; null: nothing */
+    bool endless;                 /* the command goes on until it is cut */
+    bool playing; /* the timer runs (it may play silence) */
+    stage_t stage;
+    motion_state_t ramp_state; /* the phase being emitted, that `ramp` was begun for; MOTION_STANDBY: none */
+    uint32_t *phase_left;      /* its pulses, in `profile` */
+
+    uint32_t silence_chunks; /* still to be emitted before ... */
+    uint16_t piece_ticks;    /* ... this period; 0: none */
+    bool piece_pulse;
+    uint16_t owed;        /* held pulses still to be left out */
+    int32_t carry_q16;    /* 1/65536 ticks rounded off so far */
+    uint16_t ahead_ticks; /* part of the next interval that has been emitted as silence */
+    bool dir_due;         /* the next single period sets the dir pin */
+
+    uint32_t closing_chunks; /* closing interval of the last command emitted: so many PROFILE_CHUNK_TICKS ... */
+    uint16_t closing_ticks;  /* ... and these */
+    uint16_t tail_ticks;     /* its end */
+    bool tail_fast;          /* too fast for a tail: a following command lengthens the last run instead */
+    uint8_t tail_offset;     /* the tail's segment, while stage is REST, GAP or END */
+    bool tail_awaited;       /* it has not begun: its command has not ended, and another one can be joined to it */
+    uint8_t joined;          /* the ring holds the end of so many commands and the beginning of the next one ... */
+    uint8_t joined_offset;   /* ... which begins at the end of this segment */
+
+    int32_t emitted; /* position, in pulses, when all that is in the ring has been played */
+    uint32_t v_in_play;
+    uint32_t in_play_cycle_us; /* 0: follows from v_in_play */
+    uint8_t begun; /* commands, modulo 256 */
+    uint8_t ended;
+    uint8_t faults;
+    bool gap_off;
+    bool single; /* the ring plays single pulses */
+} engine;
 static profile_basis_t basis;
-static uint16_t width_ticks; /* of a pulse */
+static uint32_t certain_centi;   /* steepest linear ramp whose first interval is longer than AHEAD_LONG_TICKS */
 static motion_command_t command; /* being emitted or played */
-static profile_t profile;        /* what is left of it to be emitted */
-static const motion_command_t *next; /* offered, not begun; null: nothing */
-static bool playing; /* the timer runs (it may play silence) */
-static stage_t stage;
+static profile_t profile;        /* what is left of the command to be emitted */
 static ramp_t ramp;
-static motion_state_t ramp_state; /* the phase that `ramp` was begun for; MOTION_STANDBY: none */
-static uint32_t *phase_left;       /* pulses of the phase being emitted, in `profile` */
-static block_t block;             /* of that phase, while it has runs left */
-
-static uint32_t silence_chunks;  /* still to be emitted before ... */
-static uint16_t piece_ticks;     /* ... this period; 0: none */
-static bool piece_pulse;
-static uint16_t owed;            /* held pulses still to be left out */
-static int32_t carry_q16;        /* 1/65536 ticks rounded off so far */
-static uint16_t ahead_ticks;     /* part of the next interval that has been emitted as silence */
-static bool dir_due;             /* the next single period sets the dir pin */
-static uint32_t closing_chunks;  /* closing interval of the last command emitted: so many PROFILE_CHUNK_TICKS ... */
-static uint16_t closing_ticks;   /* ... and these */
-static uint8_t tail_offset;      /* its tail segment, while stage is REST, GAP or END */
-static bool tail_valid;          /* a command can still be joined to it */
-static bool tail_awaited;        /* it has not begun yet: its command has not ended */
-static uint8_t joined;           /* the ring holds the end of so many commands and the beginning of the next one ... */
-static uint8_t joined_offset;    /* ... which begins at the end of this segment */
-static bool tail_fast;           /* too fast for a tail: a following command lengthens the last run instead */
-static uint8_t last_run_offset;
-
-static int32_t emitted; /* position, in pulses, when all that is in the ring has been played */
-static uint8_t begun, ended;   /* commands, modulo 256 */
-static bool endless;           /* the command goes on until it is cut */
-static uint8_t faults;
-static uint32_t certain_centi; /* steepest linear ramp whose first interval is longer than AHEAD_LONG_TICKS */
-static bool gap_on = true;
-static uint32_t v_in_play;
-static uint32_t in_play_cycle_us; /* 0: follows from v_in_play */
-static bool single;               /* the ring plays single pulses */
-
-static bool dir_level(bool ccw)
-{
-    return ccw != (settings.cw_level != 0);
-}
+static block_t block; /* of the phase being emitted, while it has runs left */
 
 static bool is_ccw(const motion_command_t *c)
 {
     return (c->flags & MOTION_CCW) != 0;
+}
+
+static bool is_held(const motion_command_t *c)
+{
+    return (c->flags & MOTION_SYNC) != 0;
+}
+
+/* Microseconds from the release, or the end of what was before, to the first pulse. One that is held begins a fixed time
+ * later, so that units which are released together differ by their waits. */
+static NOINLINE uint32_t lead_us(void)
+{
+    uint32_t us = command.start_wait_us;
+    uint16_t least = DIR_SETUP_TICKS / TICKS_PER_US + settings.pulse_us;
+    return is_held(&command) && us < UINT32_MAX - least ? us + least : us;
+}
+
+static NOINLINE bool has_no_ramps(const motion_command_t *c)
+{
+    return c->accel == ACCEL_NONE && c->decel == ACCEL_NONE;
 }
 
 /* Segment flags of a command's pulses, and with `turn` those that set the dir pin. */
@@ -95,7 +114,7 @@ static uint8_t direction_flags(const motion_command_t *c, bool turn)
     uint8_t flags = is_ccw(c) ? 1 << SEGMENT_CCW_BIT : 0;
     if (turn) {
         flags |= 1 << SEGMENT_SET_DIR_BIT;
-        if (dir_level(is_ccw(c)))
+        if (is_ccw(c) != (settings.cw_level != 0))
             flags |= 1 << SEGMENT_DIR_BIT;
     }
     return flags;
@@ -104,36 +123,37 @@ static uint8_t direction_flags(const motion_command_t *c, bool turn)
 void engine_init(void)
 {
     profile_basis(&basis, settings.steps_per_rev, settings.ustep, settings.slow_rpm);
-    v_in_play = basis.v_slow;
+    engine.v_in_play = basis.v_slow;
     certain_centi = (130000000u >> basis.factor_log2) / basis.steps_per_rev;
-    width_ticks = (uint16_t)settings.pulse_us * TICKS_PER_US;
+    engine.width_ticks = (uint16_t)settings.pulse_us * TICKS_PER_US;
     step_port_init();
 }
 
 /* -- the ring -------------------------------------------------------------------------------------------------- */
 
-static NOINLINE uint8_t early_periods(uint8_t flags)
+/* So many periods before its end such a segment's reload is begun. */
+static NOINLINE uint8_t early_periods(const segment_t *s)
 {
-    return (uint8_t)((flags & SEGMENT_EARLY_MASK) >> SEGMENT_EARLY_SHIFT);
+    return (uint8_t)((s->flags & SEGMENT_EARLY_MASK) >> SEGMENT_EARLY_SHIFT);
 }
 
-/* Which reload a period of top + 1 ticks needs. */
-static NOINLINE uint8_t early_flags(uint16_t top)
+/* The same for periods of top + 1 ticks. */
+static NOINLINE uint8_t early_of(uint16_t top)
 {
-    uint8_t periods = (uint8_t)((top < SEGMENT_EARLY1_BELOW_TICKS - 1) + (top < SEGMENT_EARLY2_BELOW_TICKS - 1) +
-                                (top < SEGMENT_EARLY3_BELOW_TICKS - 1));
-    return (uint8_t)(periods << SEGMENT_EARLY_SHIFT);
+    return (uint8_t)((top < SEGMENT_EARLY1_BELOW_TICKS - 1) + (top < SEGMENT_EARLY2_BELOW_TICKS - 1) +
+                     (top < SEGMENT_EARLY3_BELOW_TICKS - 1));
 }
 
 /* Periods that the interrupt counts: those waited for early are not among them. */
 static uint16_t counted_periods(const segment_t *s)
 {
-    return (uint16_t)((uint16_t)(s->count_high << 8) + (s->count_low ? s->count_low : 256u));
+    return (uint16_t)((uint16_t)(s->count_high << 8 | (uint8_t)(s->count_low - 1)) + 1);
 }
 
-static uint32_t period_ticks(const segment_t *s)
+/* Of so many of its periods. */
+static NOINLINE uint32_t ticks_of(const segment_t *s, uint16_t periods)
 {
-    return s->top + (uint32_t)1;
+    return (uint32_t)s->top * periods + periods;
 }
 
 static bool is_silent(const segment_t *s)
@@ -154,18 +174,22 @@ static uint32_t profile_pulses_left(void)
     return profile.accel_pulses + profile.cruise_pulses + profile.decel_pulses;
 }
 
-static uint8_t pulses_to_come(void)
+/* Those of them that come after the next `planned` ones and may be repeated if the ring runs empty. */
+static NOINLINE uint8_t pulses_to_come(uint16_t planned)
 {
     uint32_t left = profile_pulses_left();
-    return left > 255 ? 254 : left ? (uint8_t)(left - 1) : 0;
+    if (left <= planned)
+        return 0;
+    left -= planned;
+    return left > 255 ? 254 : (uint8_t)(left - 1);
 }
 
 static void add_pulses(uint8_t flags, uint16_t pulses)
 {
     if (flags & (1 << SEGMENT_CCW_BIT))
-        emitted -= pulses;
+        engine.emitted -= pulses;
     else
-        emitted += pulses;
+        engine.emitted += pulses;
 }
 
 /* Is the one-period segment at `offset` being played, or over? (It is loaded one period before it begins, and what comes
@@ -175,48 +199,51 @@ static bool has_begun(uint8_t offset)
     return step_idle || (uint8_t)(step_head - offset) > (uint8_t)(step_head - step_tail + SEGMENT_BYTES);
 }
 
+static void end_joined(void)
+{
+    engine.ended = (uint8_t)(engine.ended + engine.joined);
+    engine.joined = 0;
+}
+
 /* The command whose closing interval has begun its tail has ended. */
 static void look_for_end(void)
 {
-    if (joined && has_begun(joined_offset)) {
-        ended = (uint8_t)(ended + joined);
-        joined = 0;
-    }
-    if (tail_awaited && has_begun(tail_offset)) {
-        tail_awaited = false;
-        ended++;
+    if (engine.joined && has_begun(engine.joined_offset))
+        end_joined();
+    if (engine.tail_awaited && has_begun(engine.tail_offset)) {
+        engine.tail_awaited = false;
+        engine.ended++;
     }
 }
 
-static NOINLINE uint16_t give(uint32_t *phase, uint16_t pulses)
+/* Takes pulses from the phase, while there are any; returns how many more there should have been. */
+static NOINLINE uint16_t take(uint32_t *phase, uint16_t pulses)
 {
     uint16_t some = *phase < pulses ? (uint16_t)*phase : pulses;
     *phase -= some;
     return (uint16_t)(pulses - some);
 }
 
-/* The interrupt has repeated the last interval because the ring was empty: so many pulses fewer are to be made. Returns
- * how many of them the phases to come could not give. */
-static uint16_t absorb_held(void)
+/* So many of them in one run. */
+static NOINLINE uint16_t run_of(uint32_t periods)
+{
+    return periods > RUN_MAX_PERIODS ? RUN_MAX_PERIODS : (uint16_t)periods;
+}
+
+/* The interrupt has repeated the last interval because the ring was empty: so many pulses fewer are to be made. */
+static NOINLINE void absorb_held(void)
 {
     uint8_t lock = atomic_begin();
-    uint16_t held = step_held;
+    uint8_t held = step_held;
     step_held = 0;
     atomic_end(lock);
-    if (held == 0)
-        return 0;
-    faults |= ENGINE_FAULT_STARVED;
+    engine.faults |= ENGINE_FAULT_STARVED;
     add_pulses(step_flags, held);
     /* The cruise becomes shorter, or, where there is none, the ramps; the closing interval stays. */
     uint32_t left = profile_pulses_left();
-    if (left == 0)
-        return held;
-    uint16_t given = left > held ? held : (uint16_t)(left - 1);
-    held = (uint16_t)(held - given);
-    given = give(&profile.cruise_pulses, given);
-    given = give(&profile.accel_pulses, given);
-    give(&profile.decel_pulses, given);
-    return held;
+    uint8_t given = left > held ? held : left ? (uint8_t)(left - 1) : 0;
+    engine.owed = (uint16_t)(engine.owed + held - given);
+    take(&profile.decel_pulses, take(&profile.accel_pulses, take(&profile.cruise_pulses, given)));
 }
 
 /* So many pulses may be repeated from now on if the ring runs empty. */
@@ -227,49 +254,59 @@ static void allow_hold(uint8_t pulses)
     atomic_end(lock);
 }
 
-/* Appends `periods` periods of `top` + 1 ticks. Runs too short to be reloaded in time (periods that need an early reload,
- * no more of them than are waited for) are stretched: their count stays exact. */
-static void push(uint16_t periods, uint16_t top, bool pulse, motion_state_t state)
+/* Before segments are appended: takes account of what has been played. True if held pulses were among it. */
+static NOINLINE bool settle(uint8_t hold)
+{
+    look_for_end();
+    allow_hold(hold); /* first, so that what is held from here on can be given back */
+    if (step_held == 0)
+        return false;
+    absorb_held();
+    return true;
+}
+
+/* Appends so many periods of the phase, of so many ticks (0: 65,536). Runs too short to be reloaded in time (periods that
+ * need an early reload, no more of them than are waited for) are stretched: their count stays exact. */
+static void push(uint16_t periods, uint16_t ticks, bool pulse)
 {
     segment_t *s = segment_at(step_head);
-    bool turn = dir_due && periods == 1;
-    uint8_t flags = (uint8_t)(state | direction_flags(&command, turn));
-    dir_due = dir_due && !turn;
-    look_for_end();
-    allow_hold(pulse ? pulses_to_come() : 0); /* first, so that what is held from here on can be given back */
-    if (step_held)
-        owed = (uint16_t)(owed + absorb_held());
+    bool turn = false;
+    if (engine.dir_due && periods == 1) {
+        engine.dir_due = false;
+        turn = true;
+    }
+    uint8_t flags = (uint8_t)(engine.ramp_state | direction_flags(&command, turn));
+    settle(pulse ? pulses_to_come(0) : 0);
     if (pulse) {
-        uint16_t given = owed < periods ? owed : periods;
-        owed = (uint16_t)(owed - given);
+        uint16_t given = engine.owed < periods ? engine.owed : periods;
+        engine.owed = (uint16_t)(engine.owed - given);
         periods = (uint16_t)(periods - given);
         add_pulses(flags, periods);
     }
-    uint8_t early = early_flags(top);
-    uint16_t counted = periods;
-    if (periods > early_periods(early)) {
-        flags |= early;
-        counted = (uint16_t)(periods - early_periods(early));
-    } else if (early) {
+    if (periods == 0)
+        return;
+    uint16_t top = (uint16_t)(ticks - 1);
+    uint8_t early = early_of(top);
+    if (periods > early) {
+        flags = (uint8_t)(flags | early << SEGMENT_EARLY_SHIFT);
+        periods = (uint16_t)(periods - early);
+    } else {
         top = SEGMENT_EARLY1_BELOW_TICKS - 1;
     }
     s->top = top;
-    s->match = pulse ? (uint16_t)(top - width_ticks) : SEGMENT_SILENT;
-    s->count_low = (uint8_t)counted;
-    s->count_high = (uint8_t)((uint16_t)(counted - 1) >> 8);
+    s->match = pulse ? (uint16_t)(top - engine.width_ticks) : SEGMENT_SILENT;
+    s->count_low = (uint8_t)periods;
+    s->count_high = (uint8_t)((uint16_t)(periods - 1) >> 8);
     s->flags = flags;
-    if (periods)
-        step_head = (uint8_t)(step_head + SEGMENT_BYTES);
+    step_head = (uint8_t)(step_head + SEGMENT_BYTES);
 }
 
 /* The interval that ends with the pulse of the segment at `offset`: its period and the silence before it. */
 static uint32_t interval_at(uint8_t offset)
 {
-    uint32_t ticks = period_ticks(segment_at(offset));
     const segment_t *before = segment_at((uint8_t)(offset - SEGMENT_BYTES));
-    if (is_silent(before))
-        ticks += period_ticks(before) * counted_periods(before);
-    return ticks;
+    uint32_t ticks = is_silent(before) ? ticks_of(before, counted_periods(before)) : 0;
+    return ticks + ticks_of(segment_at(offset), 1);
 }
 
 /* Ticks from the segment at `offset`, which has so many periods left, to the one at `end`, or more than
@@ -278,8 +315,7 @@ static uint32_t ticks_between(uint8_t offset, uint16_t periods, uint8_t end)
 {
     uint32_t ticks = 0;
     while (offset != end && ticks <= JOIN_SOON_TICKS) {
-        const segment_t *s = segment_at(offset);
-        ticks += period_ticks(s) * periods;
+        ticks += ticks_of(segment_at(offset), periods);
         offset = (uint8_t)(offset + SEGMENT_BYTES);
         periods = counted_periods(segment_at(offset));
     }
@@ -299,7 +335,7 @@ static int32_t pulses_from(uint8_t offset)
     int32_t pulses = 0;
     while (offset != step_head) {
         const segment_t *s = segment_at(offset);
-        pulses += signed_pulses(s, (uint16_t)(counted_periods(s) + early_periods(s->flags)));
+        pulses += signed_pulses(s, (uint16_t)(counted_periods(s) + early_periods(s)));
         offset = (uint8_t)(offset + SEGMENT_BYTES);
     }
     return pulses;
@@ -307,8 +343,8 @@ static int32_t pulses_from(uint8_t offset)
 
 int32_t engine_position(void)
 {
-    if (!playing)
-        return emitted;
+    if (!engine.playing)
+        return engine.emitted;
     step_snapshot_t at = step_port_snapshot();
     uint8_t loaded_offset = (uint8_t)(at.tail - SEGMENT_BYTES);
     const segment_t *loaded = segment_at(loaded_offset);
@@ -318,67 +354,42 @@ int32_t engine_position(void)
         running = segment_at((uint8_t)(loaded_offset - SEGMENT_BYTES));
     int32_t to_come = pulses_from(at.tail);
     if (!step_idle)
-        to_come += signed_pulses(loaded, (uint16_t)(at.to_count + early_periods(loaded->flags)));
+        to_come += signed_pulses(loaded, (uint16_t)(at.to_count + early_periods(loaded)));
     if (!at.pulse_high && !at.period_over && !step_idle)
         to_come += signed_pulses(running, 1);
-    return emitted - to_come;
+    return engine.emitted - to_come;
 }
 
 /* -- emission -------------------------------------------------------------------------------------------------- */
 
-/* Sets up an interval that ends with a pulse (or not); emit() turns it into segments. */
-static void set_interval(uint32_t chunks, uint32_t ticks, bool pulse)
+/* Sets up an interval of so many chunks and ticks (which may be negative) that ends with a pulse (or not); emit() turns it
+ * into segments. */
+static void set_interval(uint32_t chunks, int32_t ticks, bool pulse)
 {
-    if (ahead_ticks) {
-        while (ticks < ahead_ticks + SHORTEST_PIECE_TICKS) {
-            ticks += PROFILE_CHUNK_TICKS;
-            chunks--;
-        }
-        ticks -= ahead_ticks;
-        ahead_ticks = 0;
-    }
-    if (chunks && ticks < SHORTEST_PIECE_TICKS) {
-        ticks += PROFILE_CHUNK_TICKS;
+    ticks -= engine.ahead_ticks;
+    engine.ahead_ticks = 0;
+    chunks += (uint32_t)(ticks >> PROFILE_CHUNK_LOG2);
+    uint16_t piece = (uint16_t)((uint16_t)ticks % PROFILE_CHUNK_TICKS);
+    /* No piece too short, and what fits a period is one. */
+    while (chunks && (piece < SHORTEST_PIECE_TICKS || (chunks == 1 && piece < PROFILE_CHUNK_TICKS))) {
+        piece = (uint16_t)(piece + PROFILE_CHUNK_TICKS);
         chunks--;
     }
-    if (chunks == 1 && ticks < PROFILE_CHUNK_TICKS) {
-        ticks += PROFILE_CHUNK_TICKS;
-        chunks = 0;
-    }
-    silence_chunks = chunks;
-    piece_ticks = (uint16_t)ticks; /* below 65536 */
-    piece_pulse = pulse;
+    engine.silence_chunks = chunks;
+    engine.piece_ticks = piece;
+    engine.piece_pulse = pulse;
 }
 
 /* Adds the carried fraction to a time; what remains is carried on. */
 static NOINLINE uint32_t take_carry(uint32_t ticks, uint16_t frac_q16)
 {
-    int32_t carry = carry_q16 + frac_q16;
-    carry_q16 = carry & 0xFFFF;
+    int32_t carry = engine.carry_q16 + frac_q16;
+    engine.carry_q16 = carry & 0xFFFF;
     return (uint32_t)((int32_t)ticks + (carry >> 16));
 }
 
-/* `pulses` intervals, `longer` of them of ticks + 1, the others of ticks. Too few of either kind for an early reload are
- * made like the others, and the difference is carried. */
-static void push_run(uint16_t pulses, uint16_t longer, uint16_t ticks, bool faster, motion_state_t state)
-{
-    uint8_t early = early_periods(early_flags((uint16_t)(ticks - 1)));
-    uint16_t ideal = longer;
-    if (longer <= early)
-        longer = 0;
-    else if (pulses - longer <= early)
-        longer = pulses;
-    carry_q16 += (int32_t)(int16_t)(ideal - longer) * 65536;
-    if (faster && longer)
-        push(longer, ticks, true, state);
-    if (pulses != longer)
-        push((uint16_t)(pulses - longer), (uint16_t)(ticks - 1), true, state);
-    if (!faster && longer)
-        push(longer, ticks, true, state);
-}
-
 /* push() without its cases: pulses of at least SEGMENT_EARLY1_BELOW_TICKS, many more to come. */
-static inline void append(uint16_t periods, uint16_t top, uint16_t width, uint8_t flags)
+static NOINLINE void append(uint16_t periods, uint16_t top, uint16_t width, uint8_t flags)
 {
     segment_t *s = segment_at(step_head);
     s->top = top;
@@ -396,65 +407,86 @@ static void append_silence(uint16_t periods, uint16_t top, uint8_t flags)
 
 static void begin_ramp(motion_state_t state)
 {
-    if (ramp_state == state)
+    if (engine.ramp_state == state)
         return;
-    ramp_state = state;
+    engine.ramp_state = state;
     if (state == MOTION_ACCEL)
         profile_begin_accel(&profile, &basis, &ramp);
     else
         profile_begin_decel(&profile, &basis, &ramp);
 }
 
-/* `pulses` intervals of a ramp that last `ticks` together. */
-static void emit_flat(uint16_t pulses, uint32_t ticks, motion_state_t state, bool faster)
+/* Does the phase have its longer intervals first? */
+static NOINLINE bool speeds_up(void)
+{
+    return engine.ramp_state == MOTION_ACCEL && profile.faster;
+}
+
+/* `pulses` intervals of the phase that last `ticks` together: of two neighbouring values. Too few of either kind for an
+ * early reload are made like the others, and the difference is carried. */
+static void emit_flat(uint16_t pulses, uint32_t ticks)
 {
     if (pulses == 1) {
-        if (ticks > 65535u || ahead_ticks)
-            set_interval(ticks >> PROFILE_CHUNK_LOG2, ticks & (PROFILE_CHUNK_TICKS - 1), true);
+        if (ticks > 65535u || engine.ahead_ticks)
+            set_interval(0, (int32_t)ticks, true);
         else
-            push(1, (uint16_t)(ticks - 1), true, state);
+            push(1, (uint16_t)ticks, true);
         return;
     }
-    uint32_t each = ticks / pulses;
-    push_run(pulses, (uint16_t)((uint16_t)ticks - (uint16_t)each * pulses), (uint16_t)each, faster, state);
+    uint16_t each = (uint16_t)(ticks / pulses);
+    uint16_t longer = (uint16_t)((uint16_t)ticks - each * pulses);
+    uint16_t ideal = longer;
+    uint8_t early = early_of((uint16_t)(each - 1));
+    if (longer <= early)
+        longer = 0;
+    else if (pulses - longer <= early)
+        longer = pulses;
+    engine.carry_q16 += (int32_t)(int16_t)(ideal - longer) * 65536;
+    bool more = engine.ramp_state == MOTION_CRUISE || speeds_up();
+    for (uint8_t kinds = 0; kinds < 2; kinds++, more = !more) {
+        uint16_t some = more ? longer : (uint16_t)(pulses - longer);
+        if (some)
+            push(some, (uint16_t)(each + more), true);
+    }
+}
+
+/* The phase's pulses that may be emitted: the last one of all has the closing interval. */
+static NOINLINE uint32_t pulses_of_phase(void)
+{
+    uint32_t most = profile_pulses_left() - 1;
+    return *engine.phase_left < most ? *engine.phase_left : most;
 }
 
 /* Appends what the ring has room for of the block. */
 static void emit_block(void)
 {
-    uint32_t *left = phase_left;
-    look_for_end();
     uint8_t pulses = block.pulses;
     uint8_t runs = block.runs;
-    uint32_t spare = profile_pulses_left() - 1; /* the closing interval has one */
     uint16_t planned = (uint16_t)(runs * pulses);
-    /* First, so that what is held from here on can be given back. */
-    allow_hold(spare < planned ? 0 : spare - planned > 254 ? 254 : (uint8_t)(spare - planned));
-    if (step_held) {
-        owed = (uint16_t)(owed + absorb_held());
-        spare = profile_pulses_left() - 1;
+    if (settle(pulses_to_come(planned))) {
+        uint32_t most = pulses_of_phase();
+        if (most < planned) /* held pulses have been taken from it */
+            block.runs = runs = (uint8_t)((uint16_t)most / pulses);
     }
-    if (spare > *left)
-        spare = *left;
-    if (spare < planned) /* held pulses have been taken from it */
-        block.runs = runs = (uint8_t)(spare / pulses);
     block_append(&block);
     uint16_t made = (uint16_t)((uint8_t)(runs - block.runs) * pulses);
-    *left -= made;
+    take(engine.phase_left, made);
     add_pulses(block.flags, made);
     if (block.runs == 0)
-        carry_q16 += (int32_t)(block.shape & BLOCK_SPLIT ? block.carry_q16 : (uint32_t)block.carry_q16 * pulses);
+        engine.carry_q16 += (int32_t)(block.shape & BLOCK_SPLIT ? block.carry_q16 : (uint32_t)block.carry_q16 * pulses);
 }
 
 /* What the block's runs do not say: the ticks carried so far, their segments' flags. */
-static void begin_block(bool faster)
+static void begin_block(void)
 {
-    bool split = block.top_q16 >> 16 >= BLOCK_SPLIT_TICKS - 1;
-    block.shape = (uint8_t)((faster ? BLOCK_FASTER : 0) | (split ? BLOCK_SPLIT : 0));
-    block.carry_q16 = 0;
-    if (carry_q16 > 0) { /* otherwise it waits for a single interval */
-        uint32_t carry = (uint32_t)carry_q16;
-        carry_q16 = 0;
+    uint8_t split = block.top_q16 >> 16 >= BLOCK_SPLIT_TICKS - 1 ? BLOCK_SPLIT : 0;
+    block.shape = split;
+    if (speeds_up())
+        block.shape |= BLOCK_FASTER;
+    uint32_t carry = 0;
+    if (engine.carry_q16 > 0) { /* otherwise it waits for a single interval */
+        carry = (uint32_t)engine.carry_q16;
+        engine.carry_q16 = 0;
         if (!split || carry > UINT16_MAX) {
             carry /= block.pulses; /* of each interval */
             if (split || carry > UINT16_MAX) { /* left by runs of more pulses */
@@ -462,16 +494,16 @@ static void begin_block(bool faster)
                 carry = 0;
             }
         }
-        block.carry_q16 = (uint16_t)carry;
     }
-    block.width_ticks = width_ticks;
-    block.flags = (uint8_t)(ramp_state | direction_flags(&command, false));
+    block.carry_q16 = (uint16_t)carry;
+    block.width_ticks = engine.width_ticks;
+    block.flags = (uint8_t)(engine.ramp_state | direction_flags(&command, false));
 }
 
 /* The next intervals of the ramp of `ramp_state`: pulses all alike, a block, or some of the former before a block. */
-static void emit_ramp(uint32_t at_most, bool faster)
+static void emit_ramp(uint32_t at_most)
 {
-    if (ahead_ticks || dir_due || owed)
+    if (engine.ahead_ticks || engine.dir_due || engine.owed)
         at_most = 1;
     uint32_t ticks = 0;
     uint8_t pulses = 0;
@@ -479,183 +511,151 @@ static void emit_ramp(uint32_t at_most, bool faster)
         ramp_time_t sum;
         uint16_t group = ramp_next(&ramp, &basis.ramp, at_most, &sum, &block);
         if (block.runs) {
-            begin_block(faster);
+            begin_block();
             break;
         }
         ticks += take_carry(sum.ticks, sum.frac_q16);
         pulses = (uint8_t)(pulses + group);
         at_most -= group;
     } while (ramp.rest && at_most);
-    *phase_left -= pulses;
+    take(engine.phase_left, pulses);
     if (pulses)
-        emit_flat(pulses, ticks, ramp_state, faster);
+        emit_flat(pulses, ticks);
 }
 
 static void emit_cruise(uint32_t at_most)
 {
     const profile_interval_t *interval = &profile.cruise;
-    uint32_t ticks = interval->ticks_q8 >> 8;
     uint8_t frac = (uint8_t)interval->ticks_q8;
-    uint32_t chunks = interval->chunks;
-    if (chunks == 1 && ticks < PROFILE_CHUNK_TICKS - 1) {
-        ticks += PROFILE_CHUNK_TICKS;
-        chunks = 0;
-    }
-    if (chunks || ahead_ticks) {
-        (*phase_left)--;
-        ticks = take_carry(ticks, (uint16_t)(frac << 8));
-        set_interval(chunks, ticks, true);
+    if (interval->chunks > 1 || engine.ahead_ticks) {
+        take(engine.phase_left, 1);
+        set_interval(interval->chunks, (int32_t)take_carry(interval->ticks_q8 >> 8, (uint16_t)(frac << 8)), true);
         return;
     }
-    uint16_t run = at_most > RUN_MAX_PERIODS ? RUN_MAX_PERIODS : (uint16_t)at_most;
+    uint16_t ticks = (uint16_t)(interval->ticks_q8 >> 8);
+    if (interval->chunks)
+        ticks = (uint16_t)(ticks + PROFILE_CHUNK_TICKS);
+    uint16_t run = run_of(at_most);
     if (frac == 0 || run < 8) {
-        *phase_left -= run;
+        take(engine.phase_left, run);
         uint32_t fraction = (uint32_t)frac * run;
-        emit_flat(run, take_carry(ticks * run + (fraction >> 8), (uint16_t)(fraction << 8)), MOTION_CRUISE, true);
+        emit_flat(run, take_carry((uint32_t)ticks * run + (fraction >> 8), (uint16_t)(fraction << 8)));
         return;
     }
     /* Runs of two neighbouring values. */
-    uint8_t run_log2 = 3;
-    while (run_log2 < 7 && ticks << run_log2 < CRUISE_GROUP_TICKS && run >> run_log2 > 1)
-        run_log2++;
-    run = (uint16_t)(run >> run_log2);
+    uint8_t pulses = 8;
+    run /= 8;
+    for (uint16_t least = CRUISE_GROUP_TICKS / 8; pulses < 128 && ticks < least && run > 1; least /= 2) {
+        pulses = (uint8_t)(pulses * 2);
+        run /= 2;
+    }
     block.runs = (uint8_t)(run > 255u ? 255u : run);
-    block.pulses = (uint8_t)(1u << run_log2);
-    block.top_q16 = ((ticks - 1) << 16) | (uint32_t)frac << 8;
+    block.pulses = pulses;
+    block.top_q16 = (uint32_t)(ticks - 1u) << 16 | (uint16_t)(frac << 8);
     block.slope_q16 = 0;
     block.curve_q16 = 0;
-    begin_block(false);
+    begin_block();
 }
 
-/* The interval after the last pulse of the command: body, then tail. */
+/* The interval after the last pulse of the command, which is of this phase: body, then tail. */
 static void begin_closing(void)
 {
     profile_t *p = &profile;
+    ramp_time_t last;
     uint32_t chunks = 0;
-    uint32_t ticks;
-    motion_state_t state = p->decel_pulses ? MOTION_DECEL : p->cruise_pulses ? MOTION_CRUISE : MOTION_ACCEL;
-    if (state == MOTION_CRUISE) {
+    if (engine.ramp_state == MOTION_CRUISE) {
         chunks = p->cruise.chunks;
-        ticks = take_carry(p->cruise.ticks_q8 >> 8, (uint16_t)(p->cruise.ticks_q8 << 8));
+        last.ticks = p->cruise.ticks_q8 >> 8;
+        last.frac_q16 = (uint16_t)(p->cruise.ticks_q8 << 8);
     } else {
-        begin_ramp(state);
-        ramp_time_t sum;
-        (void)ramp_next(&ramp, &basis.ramp, 1, &sum, &block);
-        ticks = take_carry(sum.ticks, sum.frac_q16);
-        chunks = ticks >> PROFILE_CHUNK_LOG2;
-        ticks &= PROFILE_CHUNK_TICKS - 1;
+        (void)ramp_next(&ramp, &basis.ramp, 1, &last, &block);
     }
-    p->accel_pulses = p->cruise_pulses = p->decel_pulses = 0;
-    ramp_state = state; /* the body belongs to the phase */
-    closing_chunks = chunks;
-    closing_ticks = (uint16_t)ticks;
-    tail_fast = chunks == 0 && ticks < SEGMENT_EARLY1_BELOW_TICKS;
-    stage = STAGE_TAIL;
-    if (chunks || ticks >= 2 * TAIL_TICKS) {
-        if (ticks < 2 * TAIL_TICKS) {
-            ticks += PROFILE_CHUNK_TICKS;
-            chunks--;
-        }
-        ticks -= TAIL_TICKS;
-        set_interval(chunks, ticks, false);
-    }
+    uint32_t ticks = take_carry(last.ticks, last.frac_q16);
+    chunks += ticks >> PROFILE_CHUNK_LOG2;
+    ticks &= PROFILE_CHUNK_TICKS - 1;
+    *engine.phase_left = 0;
+    engine.closing_chunks = chunks;
+    engine.closing_ticks = (uint16_t)ticks;
+    engine.tail_ticks = TAIL_TICKS;
+    if (chunks || ticks >= 2 * TAIL_TICKS)
+        set_interval(chunks, (int32_t)(ticks - TAIL_TICKS), false);
+    else
+        engine.tail_ticks = (uint16_t)ticks;
+    engine.tail_fast = engine.tail_ticks < SEGMENT_EARLY1_BELOW_TICKS;
+    if (engine.tail_fast)
+        engine.tail_ticks = SHORTEST_PIECE_TICKS;
+    engine.stage = STAGE_TAIL;
 }
 
 static void push_tail(void)
 {
-    uint16_t ticks = TAIL_TICKS;
-    if (closing_chunks == 0 && closing_ticks < 2 * TAIL_TICKS) {
-        ticks = closing_ticks;
-        if (ahead_ticks)
-            ahead_ticks = 0;
-    }
-    if (tail_fast)
-        ticks = SHORTEST_PIECE_TICKS;
-    tail_offset = step_head;
-    last_run_offset = (uint8_t)(step_head - SEGMENT_BYTES);
-    tail_valid = true;
-    push(1, (uint16_t)(ticks - 1), false, MOTION_STOP);
-    tail_awaited = true;
+    engine.tail_offset = step_head;
+    engine.ramp_state = MOTION_STOP;
+    push(1, engine.tail_ticks, false);
+    engine.tail_awaited = true;
 }
 
 /* What comes next, but for a block, which is only begun. False if there is nothing. */
 static bool emit_other(void)
 {
-    if (silence_chunks) {
-        uint16_t periods = silence_chunks > RUN_MAX_PERIODS ? RUN_MAX_PERIODS : (uint16_t)silence_chunks;
-        silence_chunks -= periods;
-        push(periods, PROFILE_CHUNK_TICKS - 1, false, ramp_state);
+    if (engine.silence_chunks) {
+        uint16_t periods = run_of(engine.silence_chunks);
+        take(&engine.silence_chunks, periods);
+        push(periods, PROFILE_CHUNK_TICKS, false);
         return true;
     }
-    if (piece_ticks) {
-        uint16_t ticks = piece_ticks;
-        piece_ticks = 0;
-        push(1, (uint16_t)(ticks - 1), piece_pulse, ramp_state);
+    if (engine.piece_ticks) {
+        uint16_t ticks = engine.piece_ticks;
+        engine.piece_ticks = 0;
+        push(1, ticks, engine.piece_pulse);
         return true;
     }
     profile_t *p = &profile;
-    switch (stage) {
-    case STAGE_REST:
-        return false;
-    case STAGE_LEAD: {
-        /* The start wait, then the first pulse. */
-        uint32_t us = command.start_wait_us;
-        uint32_t chunks = us >> (PROFILE_CHUNK_LOG2 - 4);
-        uint32_t ticks = (us & (PROFILE_CHUNK_TICKS / TICKS_PER_US - 1)) * TICKS_PER_US;
-        ramp_state = MOTION_STANDBY;
-        set_interval(chunks, ticks + DIR_SETUP_TICKS + width_ticks, true);
-        stage = STAGE_RUN;
-        return true;
-    }
-    case STAGE_RUN: {
-        uint32_t after = p->decel_pulses;
-        motion_state_t state = MOTION_DECEL;
-        phase_left = &p->decel_pulses;
-        if (p->accel_pulses) {
-            after += p->cruise_pulses;
-            phase_left = &p->accel_pulses;
-            state = MOTION_ACCEL;
-        } else if (p->cruise_pulses) {
-            phase_left = &p->cruise_pulses;
-            state = MOTION_CRUISE;
-        } else {
-            after = 0;
+    stage_t stage = engine.stage;
+    if (stage == STAGE_RUN) {
+        motion_state_t state = MOTION_ACCEL;
+        uint32_t *left = &p->accel_pulses;
+        while (*left == 0 && state != MOTION_DECEL) {
+            left++; /* cruise, deceleration */
+            state++;
         }
-        uint8_t kept = after == 0; /* for the closing interval */
-        uint32_t at_most = *phase_left - kept;
-        if (*phase_left <= kept) {
-            begin_closing();
-        } else if (state == MOTION_CRUISE) {
-            ramp_state = state;
-            if (endless && at_most < UINT32_MAX / 2)
-                p->cruise_pulses += UINT32_MAX / 2;
-            emit_cruise(at_most);
-        } else {
+        if (engine.endless && state == MOTION_CRUISE && *left < UINT32_MAX / 2)
+            *left += UINT32_MAX / 2;
+        engine.phase_left = left;
+        uint32_t at_most = pulses_of_phase();
+        if (state == MOTION_CRUISE)
+            engine.ramp_state = state;
+        else
             begin_ramp(state);
-            emit_ramp(at_most, state == MOTION_ACCEL && p->faster);
-        }
+        if (at_most == 0)
+            begin_closing();
+        else if (state == MOTION_CRUISE)
+            emit_cruise(at_most);
+        else
+            emit_ramp(at_most);
         return true;
     }
-    case STAGE_TAIL:
+    if (stage == STAGE_REST || (stage == STAGE_GAP && engine.next))
+        return false; /* (it will be joined) */
+    engine.stage = (stage_t)(stage + 1);
+    if (stage == STAGE_LEAD) {
+        /* The start wait, then the first pulse. */
+        uint32_t us = lead_us();
+        engine.ramp_state = MOTION_STANDBY;
+        set_interval(us >> PROFILE_CHUNK_US_LOG2, (uint16_t)us % PROFILE_CHUNK_US * TICKS_PER_US, true);
+    } else if (stage == STAGE_TAIL) {
         push_tail();
-        v_in_play = p->v_exit;
-        in_play_cycle_us = p->exit_cycle_us;
-        stage = STAGE_GAP;
-        return true;
-    case STAGE_GAP:
-        if (next)
-            return false; /* it will be joined */
-        ramp_state = MOTION_STANDBY;
-        if (gap_on)
-            set_interval(closing_chunks, tail_fast ? SHORTEST_PIECE_TICKS : closing_ticks, false);
-        stage = STAGE_END;
-        return true;
-    case STAGE_END:
-        push(1, SHORTEST_PIECE_TICKS - 1, false, MOTION_STANDBY);
-        stage = STAGE_REST;
-        return true;
+        engine.v_in_play = p->v_exit;
+        engine.in_play_cycle_us = p->exit_cycle_us;
+    } else if (stage == STAGE_GAP) {
+        engine.ramp_state = MOTION_STANDBY;
+        if (!engine.gap_off)
+            set_interval(engine.closing_chunks, engine.tail_fast ? engine.tail_ticks : engine.closing_ticks, false);
+    } else {
+        push(1, SHORTEST_PIECE_TICKS, false);
+        engine.stage = STAGE_REST;
     }
-    return false;
+    return true;
 }
 
 /* One step of emission; false if there is nothing to emit. The ring has room for RING_RESERVE segments. */
@@ -673,92 +673,102 @@ static bool emit(void)
 /* Nothing of the command is to be emitted any more, or joined to. */
 static void drop_emission(void)
 {
-    silence_chunks = 0;
-    piece_ticks = 0;
+    engine.silence_chunks = 0;
+    engine.piece_ticks = 0;
     block.runs = 0;
-    ahead_ticks = 0;
-    ramp_state = MOTION_STANDBY;
-    tail_awaited = false;
-    tail_valid = false;
+    engine.ahead_ticks = 0;
+    engine.ramp_state = MOTION_STANDBY;
+    engine.tail_awaited = false;
 }
 
 /* -- starting and joining ----------------------------------------------------------------------------------------- */
 
 static void begin_ring(void)
 {
-    if (playing)
+    if (engine.playing)
         step_port_halt();
-    playing = false;
+    engine.playing = false;
     step_head = step_tail = 0;
     step_hold = 0;
     step_held = 0;
     step_idle = 0;
-    owed = 0;
-    carry_q16 = 0;
-    dir_due = false;
-    joined = 0;
-    single = false;
+    engine.owed = 0;
+    engine.carry_q16 = 0;
+    engine.dir_due = false;
+    engine.joined = 0;
+    engine.single = false;
     drop_emission();
+}
+
+static void forget_velocity(void)
+{
+    engine.v_in_play = basis.v_slow;
+    engine.in_play_cycle_us = 0;
+}
+
+/* Is the velocity in play kept until now? */
+static void expire_gap(void)
+{
+    if (!engine.gap_off)
+        forget_velocity();
+}
+
+static void plan(void)
+{
+    profile_plan(&profile, &basis, &command, engine.v_in_play);
+}
+
+static NOINLINE void play(void)
+{
+    engine.playing = true;
+    step_port_start();
 }
 
 /* Takes the values of what is offered. */
 static void take_next(void)
 {
-    command = *next;
-    next = 0;
-    begun++;
-    endless = command.count == 0;
-    if (endless) {
+    command = *engine.next;
+    engine.next = 0;
+    engine.begun++;
+    engine.endless = command.count == 0;
+    if (engine.endless) {
         command.count = UINT32_MAX; /* its cruise is made longer as it is played */
         command.extra_pulses = 0;
         command.flags |= MOTION_PULSES;
     }
 }
 
-static void plan(void)
-{
-    profile_plan(&profile, &basis, &command, v_in_play);
-}
-
-static void play(void)
-{
-    playing = true;
-    if (command.flags & MOTION_SYNC)
-        step_port_hold();
-    else
-        step_port_start();
-}
-
 /* The first interval of most profiles is long, whatever the rest turns out to be: then the first pulse need not wait for
  * the planning. Returns how much of that interval may certainly be begun, from few operations; 0: plan first. */
 static uint16_t certain_ticks(void)
 {
-    if (v_in_play != basis.v_slow || command.flags & MOTION_SYNC)
+    uint32_t velocity = command.velocity;
+    bool is_cycle = command.flags & MOTION_CYCLE;
+    if (engine.v_in_play != basis.v_slow || is_held(&command))
         return 0;
+    uint16_t ahead = AHEAD_LONG_TICKS;
     if (command.accel == ACCEL_NONE) { /* the cruise interval, or that of the deceleration */
-        uint16_t flat = command.decel == ACCEL_NONE ? AHEAD_SHORT_TICKS : AHEAD_LONG_TICKS;
-        return command.flags & MOTION_CYCLE && command.velocity >> basis.factor_log2 >= flat / 8 ? flat : 0;
+        if (command.decel == ACCEL_NONE)
+            ahead = AHEAD_SHORT_TICKS;
+        return is_cycle && velocity >> basis.factor_log2 >= ahead / 8 ? ahead : 0;
     }
     if (basis.slow_ticks < AHEAD_TICKS + SHORTEST_PIECE_TICKS)
         return 0;
-    uint16_t least_rpm;
-    uint16_t ahead = AHEAD_TICKS;
+    uint16_t least_rpm = 100;
     uint32_t accel = accel_centi(command.accel);
     if (!(command.flags & MOTION_LINEAR)) {
         /* At least one step of acceleration, at slow speed. */
         least_rpm = (uint16_t)(settings.slow_rpm + 2u + (uint16_t)(accel >> 6));
-        if (basis.slow_ticks >= AHEAD_LONG_TICKS + SHORTEST_PIECE_TICKS)
-            ahead = AHEAD_LONG_TICKS;
-    } else {
+        if (basis.slow_ticks < AHEAD_LONG_TICKS + SHORTEST_PIECE_TICKS)
+            ahead = AHEAD_TICKS;
+    } else if (basis.steps_per_rev < 200 || accel > certain_centi || command.accel > command.decel) {
         /* c0 = sqrt(3.217e17 / (sprf * F * centi)) ticks is long enough; at least one step from 100 RPM on with 200 steps
          * and more, and no less of acceleration than of deceleration in a truncated profile. */
-        least_rpm = basis.steps_per_rev >= 200 && accel <= certain_centi && command.accel <= command.decel ? 100 : 65535;
-        ahead = AHEAD_LONG_TICKS;
+        return 0;
     }
-    uint32_t velocity = command.velocity;
-    bool fast = command.flags & MOTION_CYCLE ? velocity < 65536u && velocity * least_rpm <= basis.us_rpm
-                                             : velocity >= least_rpm;
-    return fast ? ahead : 0;
+    if (is_cycle ? velocity > UINT16_MAX || velocity * least_rpm > basis.us_rpm : velocity < least_rpm)
+        return 0;
+    return ahead;
 }
 
 /* Emits enough to be played until the next round of the main loop, and where a ramp begins steeply, before the timer
@@ -769,7 +779,7 @@ static void fill(void)
     uint16_t periods = 0;
     uint8_t offset = step_head;
     while ((ticks < START_TICKS || periods < START_PERIODS ||
-            (!playing && (ramp_state == MOTION_ACCEL || ramp_state == MOTION_DECEL) &&
+            (!engine.playing && (engine.ramp_state == MOTION_ACCEL || engine.ramp_state == MOTION_DECEL) &&
              (ramp.steep > 1 || ramp.group_log2 == 0))) &&
            ring_free() >= RING_RESERVE && emit()) {
         uint16_t first = counted_periods(segment_at(offset));
@@ -783,155 +793,155 @@ static void fill(void)
  * last for long enough. Emits them and returns how many; 0: plan first. */
 static uint16_t begin_cruise(void)
 {
-    uint8_t factor_log2 = basis.factor_log2;
-    if (command.accel != ACCEL_NONE || command.decel != ACCEL_NONE || command.flags & MOTION_SYNC)
+    if (!has_no_ramps(&command) || is_held(&command))
         return 0;
     uint32_t cycle_us = profile_cycle_us(&basis, &command);
-    uint16_t ticks = (uint16_t)(cycle_us * TICKS_PER_US);
-    if (cycle_us > UINT16_MAX / TICKS_PER_US || ticks & ((1u << factor_log2) - 1))
+    if (cycle_us > UINT16_MAX / TICKS_PER_US)
         return 0;
-    ticks = (uint16_t)(ticks >> factor_log2);
+    uint16_t ticks = (uint16_t)(cycle_us * TICKS_PER_US);
+    for (uint8_t halvings = basis.factor_log2; halvings; halvings--) {
+        if (ticks & 1)
+            return 0;
+        ticks /= 2;
+    }
     uint32_t pulses = command.count - 1; /* at least: full steps have more */
-    uint16_t run = pulses > RUN_MAX_PERIODS ? RUN_MAX_PERIODS : (uint16_t)pulses;
+    uint16_t run = run_of(pulses);
     if ((uint32_t)run * ticks < START_TICKS)
         return 0;
     profile.accel_pulses = profile.cruise_pulses = profile.decel_pulses = 0;
-    push(run, (uint16_t)(ticks - 1), true, MOTION_CRUISE);
+    engine.ramp_state = MOTION_CRUISE;
+    push(run, ticks, true);
+    play();
     return run;
 }
 
-/* Starts the command, which is not planned yet, from standstill. */
-static void start_now(void)
+/* Starts the next command, which is not planned yet, from standstill. */
+static void start_next(void)
 {
     begin_ring();
-    step_port_dir(dir_level(is_ccw(&command)));
-    uint8_t flags = direction_flags(&command, false);
-    uint16_t certain = certain_ticks();
+    take_next();
+    uint32_t us = lead_us();
+    bool held = is_held(&command);
+    if (held)
+        expire_gap();
+    uint8_t flags = direction_flags(&command, true);
+    step_port_dir(flags & 1 << SEGMENT_DIR_BIT);
+    flags &= 1 << SEGMENT_CCW_BIT;
     uint16_t cruised = 0;
-    if (command.start_wait_us < 3072u) {
-        uint16_t lead = (uint16_t)(command.start_wait_us * TICKS_PER_US);
-        lead = (uint16_t)(lead + DIR_SETUP_TICKS + width_ticks);
-        append(1, (uint16_t)(lead - 1), width_ticks, flags);
-        add_pulses(flags, 1);
-        stage = STAGE_RUN;
-        if (certain) {
+    engine.stage = STAGE_LEAD;
+    if (us < 4096u) {
+        uint16_t lead = (uint16_t)(us * TICKS_PER_US);
+        uint16_t least = (uint16_t)(DIR_SETUP_TICKS + engine.width_ticks);
+        append(1, (uint16_t)((lead < least ? least : lead) - 1), engine.width_ticks, flags);
+        engine.stage = STAGE_RUN;
+        engine.ahead_ticks = certain_ticks();
+        if (engine.ahead_ticks) {
             flags = (uint8_t)(flags | (command.accel == ACCEL_NONE ? MOTION_CRUISE : MOTION_ACCEL));
-            append_silence(AHEAD_PERIODS, (uint16_t)(certain / AHEAD_PERIODS - 1), flags);
-            ahead_ticks = certain;
+            append_silence(AHEAD_PERIODS, (uint16_t)(engine.ahead_ticks / AHEAD_PERIODS - 1), flags);
             play();
-        } else if ((cruised = begin_cruise()) != 0) {
-            play();
+        } else {
+            cruised = begin_cruise();
         }
+        add_pulses(flags, 1);
     } else {
-        stage = STAGE_LEAD;
         emit(); /* sets the interval up, then its silence, then the pulse */
         emit();
         emit();
-        if (!(command.flags & MOTION_SYNC))
+        if (!held)
             play();
     }
     plan();
     profile.cruise_pulses -= cruised;
     fill();
-    if (!playing)
+    if (held) {
+        engine.playing = true;
+        step_port_hold();
+    } else if (!engine.playing) {
         play();
-}
-
-/* Is the velocity in play kept until now? */
-static void expire_gap(void)
-{
-    if (gap_on) {
-        v_in_play = basis.v_slow;
-        in_play_cycle_us = 0;
     }
 }
 
 /* Ticks of the start wait, saturated. */
-static NOINLINE uint32_t wait_ticks(uint32_t us)
+static uint32_t wait_ticks(uint32_t us)
 {
     return us < UINT32_MAX / TICKS_PER_US ? us * TICKS_PER_US : UINT32_MAX;
 }
 
-/* Ticks until the tail begins, or more than JOIN_SOON_TICKS; 0: it has begun. */
-static uint32_t ticks_to_tail(void)
-{
-    step_snapshot_t at = step_port_snapshot();
-    uint8_t offset = (uint8_t)(at.tail - SEGMENT_BYTES);
-    look_for_end();
-    if (!tail_valid || !tail_awaited)
-        return 0;
-    if (offset == tail_offset) {
-        /* It is loaded: what is left of the period before it. */
-        uint16_t top = segment_at((uint8_t)(offset - SEGMENT_BYTES))->top;
-        uint16_t counter = step_port_counter();
-        return at.period_over || counter > top ? 0 : top - counter;
-    }
-    return ticks_between(offset, at.to_count, tail_offset);
-}
-
-/* Has the segment after the tail begun? (An idle timer is dealt with by engine_poll.) */
-static bool tail_is_over(void)
-{
-    step_snapshot_t at = step_port_snapshot();
-    uint8_t loaded = (uint8_t)(at.tail - SEGMENT_BYTES);
-    if (step_idle || !has_begun(tail_offset))
-        return false;
-    return loaded != (uint8_t)(tail_offset + SEGMENT_BYTES) || at.to_count != counted_periods(segment_at(loaded));
-}
-
-/* Lets the command in `next` follow the one that has been emitted: exactly one interval after its last pulse where there
+/* Lets the next command follow the one that has been emitted: exactly one interval after its last pulse where there
  * is time to plan it and to emit its first intervals, otherwise as soon as possible after its end. Not long before, so
  * that the running command can still be cut without the next one. */
 static void join_next(void)
 {
-    uint32_t ticks = ticks_to_tail();
-    uint16_t needed = next->flags & MOTION_LINEAR ? JOIN_LINEAR_TICKS : JOIN_TICKS;
-    if (next->accel == ACCEL_NONE && next->decel == ACCEL_NONE)
-        needed = JOIN_FLAT_TICKS;
-    bool timely = ticks >= needed && !(next->flags & MOTION_SYNC);
-    if (ticks > JOIN_SOON_TICKS)
-        return; /* later */
-    if (!timely && !tail_is_over())
-        return; /* at its end */
-    bool turns = is_ccw(next) != is_ccw(&command);
-    uint8_t flags = (uint8_t)(MOTION_STOP | direction_flags(next, turns));
-    uint32_t wait = wait_ticks(next->start_wait_us);
-    if (timely) {
-        uint8_t offset = tail_offset;
-        bool done;
-        if (wait >= SHORTEST_PIECE_TICKS) {
-            done = step_port_drop_after(offset);
-        } else if (tail_fast && !turns && wait == 0) {
-            offset = last_run_offset;
-            done = step_port_extend(offset);
-        } else {
-            uint16_t top = (uint16_t)(segment_at(offset)->top + wait);
-            if (turns && top < TURN_TICKS + width_ticks)
-                top = (uint16_t)(TURN_TICKS + width_ticks);
-            done = step_port_arm(offset, top, (uint16_t)(top - width_ticks), flags);
-        }
-        if (!done)
-            return; /* not at this moment */
-        joined_offset = offset;
-    }
-    take_next();
-    if (!timely) {
-        if (step_idle || command.flags & MOTION_SYNC) /* held, it stands still */
-            expire_gap();
-        start_now();
+    step_snapshot_t at = step_port_snapshot();
+    uint8_t loaded = (uint8_t)(at.tail - SEGMENT_BYTES);
+    uint8_t offset = engine.tail_offset;
+    look_for_end();
+    if (!engine.tail_awaited) {
+        /* Not before the segment after the tail has begun. (An idle timer is dealt with by engine_poll.) */
+        uint8_t distance = (uint8_t)(loaded - offset);
+        bool waits = distance == SEGMENT_BYTES && at.to_count == counted_periods(segment_at(loaded));
+        if (!step_idle && has_begun(offset) && distance != 0 && !waits)
+            start_next();
         return;
     }
+    const motion_command_t *next = engine.next;
+    if (is_held(next))
+        return; /* after its end */
+    uint32_t ticks; /* until the tail begins */
+    if (loaded == offset) {
+        /* It is loaded: what is left of the period before it. */
+        uint16_t top = segment_at((uint8_t)(offset - SEGMENT_BYTES))->top;
+        uint16_t counter = step_port_counter();
+        if (at.period_over || counter > top)
+            return;
+        ticks = top - counter;
+    } else {
+        ticks = ticks_between(loaded, at.to_count, offset);
+    }
+    uint16_t needed = next->flags & MOTION_LINEAR ? JOIN_LINEAR_TICKS : JOIN_TICKS;
+    if (has_no_ramps(next))
+        needed = JOIN_FLAT_TICKS;
+    if (ticks > JOIN_SOON_TICKS || ticks < needed)
+        return; /* later, or after its end */
+    bool turns = is_ccw(next) != is_ccw(&command);
+    uint32_t wait = wait_ticks(next->start_wait_us);
+    bool waits = wait >= SHORTEST_PIECE_TICKS;
+    uint8_t flags = (uint8_t)(MOTION_STOP | direction_flags(next, turns));
+    bool done;
+    if (engine.tail_fast && !turns && wait == 0) {
+        offset = (uint8_t)(offset - SEGMENT_BYTES); /* the last run */
+        done = step_port_extend(offset);
+    } else {
+        const segment_t *tail = segment_at(offset);
+        uint16_t top = tail->top;
+        uint16_t match = SEGMENT_SILENT;
+        if (waits) {
+            flags = tail->flags;
+        } else {
+            top = (uint16_t)(top + wait);
+            if (turns && top < TURN_TICKS + engine.width_ticks)
+                top = (uint16_t)(TURN_TICKS + engine.width_ticks);
+            match = (uint16_t)(top - engine.width_ticks);
+        }
+        done = step_port_arm(offset, top, match, flags);
+    }
+    if (!done)
+        return; /* not at this moment */
+    engine.joined_offset = offset;
+    take_next();
     drop_emission();
-    joined++;
+    engine.joined++;
     /* Longer than the gap the wait means a start from slow speed. */
-    if (wait >> PROFILE_CHUNK_LOG2 >= closing_chunks && wait > (closing_chunks << PROFILE_CHUNK_LOG2) + closing_ticks)
+    uint32_t chunks = wait >> PROFILE_CHUNK_LOG2;
+    if (chunks > engine.closing_chunks ||
+        (chunks == engine.closing_chunks && (uint16_t)wait % PROFILE_CHUNK_TICKS > engine.closing_ticks))
         expire_gap();
-    stage = STAGE_RUN;
-    if (wait >= SHORTEST_PIECE_TICKS) {
-        dir_due = turns;
-        stage = STAGE_LEAD;
+    if (waits) {
+        engine.dir_due = turns;
+        engine.stage = STAGE_LEAD;
     } else {
         add_pulses(flags, 1);
+        engine.stage = STAGE_RUN;
     }
     plan();
     fill();
@@ -944,16 +954,14 @@ status_t engine_check(const motion_command_t *c)
 
 void engine_offer(const motion_command_t *offered)
 {
-    next = offered;
-    if (next && !playing) {
-        take_next();
-        start_now();
-    }
+    engine.next = offered;
+    if (offered && !engine.playing)
+        start_next();
 }
 
 uint8_t engine_commands_begun(void)
 {
-    return begun;
+    return engine.begun;
 }
 
 void engine_release(void)
@@ -967,37 +975,35 @@ NOINLINE bool engine_poll(void)
     look_for_end();
     if (step_late) {
         step_late = 0;
-        faults |= ENGINE_FAULT_LATE;
+        engine.faults |= ENGINE_FAULT_LATE;
     }
-    if (playing && step_idle) {
+    if (engine.playing && step_idle) {
         if (!step_port_snapshot().period_over) {
             /* The last period is not over. */
-        } else if ((stage == STAGE_REST || stage == STAGE_GAP) && step_head == step_tail) {
+        } else if ((engine.stage == STAGE_REST || engine.stage == STAGE_GAP) && step_head == step_tail) {
             step_port_halt();
-            playing = false;
-            tail_valid = false;
-            single = false;
-            if (next) {
-                take_next();
-                start_now();
-            } else {
+            engine.playing = false;
+            engine.single = false;
+            if (engine.next)
+                start_next();
+            else
                 expire_gap();
-            }
         } else if (step_head != step_tail) {
             /* The planner was so late that the timer ran out of segments: go on where it stopped. */
-            if (stage == STAGE_RUN)
-                faults |= ENGINE_FAULT_STARVED;
+            if (engine.stage == STAGE_RUN)
+                engine.faults |= ENGINE_FAULT_STARVED;
             step_port_start();
         }
         worked = true;
     }
-    if (next && playing && !single && (stage == STAGE_GAP || stage == STAGE_END || stage == STAGE_REST))
+    if (engine.next && engine.playing && !engine.single && (engine.stage == STAGE_GAP || engine.stage == STAGE_END || engine.stage == STAGE_REST))
         join_next();
     /* Until the ring is half full nothing else is as urgent, within reason; then a step at a time. */
     uint8_t rounds = 6;
-    if (playing) {
+    if (engine.playing) {
         do {
-            if (ring_free() < (block.runs ? RING_REFILL : RING_RESERVE) || !emit())
+            uint8_t least = block.runs ? RING_REFILL : RING_RESERVE;
+            if (ring_free() < least || !emit())
                 break;
             worked = true;
         } while (ring_free() > SEGMENT_COUNT / 2 && --rounds);
@@ -1007,14 +1013,14 @@ NOINLINE bool engine_poll(void)
 
 uint8_t engine_commands_ended(void)
 {
-    return ended;
+    return engine.ended;
 }
 
 /* A command has been begun (its start wait included) and has not ended. */
 static bool running(void)
 {
     look_for_end();
-    return tail_awaited || (playing && (stage == STAGE_LEAD || stage == STAGE_RUN || stage == STAGE_TAIL));
+    return engine.tail_awaited || (engine.playing && (engine.stage == STAGE_LEAD || engine.stage == STAGE_RUN || engine.stage == STAGE_TAIL));
 }
 
 /* -- stopping ---------------------------------------------------------------------------------------------------- */
@@ -1022,23 +1028,22 @@ static bool running(void)
 static void drop_next(void)
 {
     look_for_end();
-    ended = (uint8_t)(ended + joined);
-    next = 0;
-    joined = 0;
+    end_joined();
+    engine.next = 0;
 }
 
 /* Freezes the pulse train where it is. */
 static void halt(void)
 {
-    if (!playing)
+    if (!engine.playing)
         return;
     step_port_halt();
     if (running())
-        ended++;
-    emitted = engine_position();
-    playing = false;
+        engine.ended++;
+    engine.emitted = engine_position();
+    engine.playing = false;
     drop_emission();
-    stage = STAGE_REST;
+    engine.stage = STAGE_REST;
     motion_state = MOTION_STANDBY;
 }
 
@@ -1046,8 +1051,7 @@ void engine_stop(void)
 {
     drop_next();
     halt();
-    v_in_play = basis.v_slow;
-    in_play_cycle_us = 0;
+    forget_velocity();
 }
 
 /* Ends the running command after what is to be played soon. Returns the interval there in ticks; 0: nothing to be cut
@@ -1062,30 +1066,29 @@ static uint32_t cut(void)
     const segment_t *s;
     for (;;) {
         s = segment_at(offset);
-        uint32_t period = period_ticks(s);
-        uint32_t ticks = period * left;
+        uint32_t ticks = ticks_of(s, left);
+        uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
         if (is_silent(s)) {
             if ((s->flags & SEGMENT_STATE_MASK) == MOTION_STOP)
                 return 0;
-        } else if ((ticks >= keep_ticks && (left > 1 || offset != (uint8_t)(at.tail - SEGMENT_BYTES))) ||
-                   (uint8_t)(offset + SEGMENT_BYTES) == step_head) {
+        } else if ((ticks >= keep_ticks && (left > 1 || after != at.tail)) || after == step_head) {
             /* (Not the last period of the loaded segment: what follows it may be loaded meanwhile.) */
-            uint16_t needed = (uint16_t)(keep_ticks / period + 4u);
+            uint16_t needed = (uint16_t)(keep_ticks / ticks_of(s, 1) + 4u);
             if (needed < left)
                 left = needed;
             break;
         }
         keep_ticks = keep_ticks > ticks ? keep_ticks - ticks : 0;
-        offset = (uint8_t)(offset + SEGMENT_BYTES);
-        if (offset == step_head)
+        if (after == step_head)
             return 0;
+        offset = after;
         left = counted_periods(segment_at(offset));
     }
     uint32_t interval_ticks = interval_at(offset);
     if (interval_ticks > basis.slow_ticks + 1)
         return 0;
-    emitted -= pulses_from((uint8_t)(offset + SEGMENT_BYTES));
-    emitted -= signed_pulses(s, step_port_shorten(offset, left));
+    int32_t dropped = pulses_from((uint8_t)(offset + SEGMENT_BYTES));
+    engine.emitted -= dropped + signed_pulses(s, step_port_shorten(offset, left));
     drop_emission();
     return interval_ticks;
 }
@@ -1100,11 +1103,10 @@ static void end_command(accel_code_t decel, bool linear)
         return; /* ending already */
     uint32_t ticks = state == MOTION_STANDBY ? 0 : cut();
     if (ticks == 0) {
-        if (state == MOTION_STANDBY || stage == STAGE_RUN || silence_chunks || piece_ticks) {
+        if (state == MOTION_STANDBY || engine.stage == STAGE_RUN || engine.silence_chunks || engine.piece_ticks) {
             /* In a start wait or at slow speed: there is nothing to ramp down from. */
             halt();
-            v_in_play = basis.v_slow;
-            in_play_cycle_us = 0;
+            forget_velocity();
         }
         return;
     }
@@ -1113,9 +1115,9 @@ static void end_command(accel_code_t decel, bool linear)
     profile.cruise.ticks_q8 = (ticks & (PROFILE_CHUNK_TICKS - 1)) << 8;
     if (profile.decel_pulses == 0)
         profile.cruise_pulses = 1; /* the closing interval */
-    endless = false;
-    ramp_state = MOTION_STANDBY;
-    stage = STAGE_RUN;
+    engine.endless = false;
+    engine.ramp_state = MOTION_STANDBY;
+    engine.stage = STAGE_RUN;
 }
 
 void engine_stop_graceful(accel_code_t decel, bool linear)
@@ -1127,7 +1129,7 @@ void engine_stop_graceful(accel_code_t decel, bool linear)
 bool engine_next(bool graceful)
 {
     look_for_end();
-    if (joined)
+    if (engine.joined)
         return false;
     end_command(graceful ? command.decel : ACCEL_NONE, (command.flags & MOTION_LINEAR) != 0);
     return true;
@@ -1137,17 +1139,17 @@ bool engine_next(bool graceful)
  * as fast as they can be typed at 250,000 Bd. */
 void engine_single_pulse(bool ccw)
 {
-    if (single) {
+    if (engine.single) {
         step_port_finish();
-    } else if (running() || next) {
+    } else if (running() || engine.next) {
         return;
     }
     begin_ring();
-    stage = STAGE_REST;
-    single = true;
+    engine.stage = STAGE_REST;
+    engine.single = true;
     command.flags = ccw ? MOTION_CCW : 0;
     uint8_t flags = direction_flags(&command, true);
-    uint16_t width = width_ticks;
+    uint16_t width = engine.width_ticks;
     append(1, (uint16_t)(TURN_TICKS + width - 1), width, flags);
     add_pulses(flags, 1);
     play();
@@ -1162,13 +1164,13 @@ motion_state_t engine_state(void)
 
 void engine_velocity(uint32_t *rpm, uint32_t *cycle_us)
 {
-    uint32_t v = v_in_play;
-    uint32_t exact_cycle_us = in_play_cycle_us;
+    uint32_t v = engine.v_in_play;
+    uint32_t exact_cycle_us = engine.in_play_cycle_us;
     motion_state_t state = engine_state();
-    if (playing && state == MOTION_CRUISE) {
+    if (engine.playing && state == MOTION_CRUISE) {
         exact_cycle_us = profile.cycle_us;
         v = profile_rpm(&basis, &command) * 100u << basis.factor_log2;
-    } else if (playing && (state == MOTION_ACCEL || state == MOTION_DECEL)) {
+    } else if (engine.playing && (state == MOTION_ACCEL || state == MOTION_DECEL)) {
         uint8_t offset = (uint8_t)(step_tail - SEGMENT_BYTES);
         if (is_silent(segment_at(offset)))
             offset = (uint8_t)(offset + SEGMENT_BYTES);
@@ -1185,17 +1187,17 @@ void engine_velocity(uint32_t *rpm, uint32_t *cycle_us)
 
 void engine_set_gap(bool on)
 {
-    gap_on = on;
+    engine.gap_off = !on;
 }
 
 bool engine_gap(void)
 {
-    return gap_on;
+    return !engine.gap_off;
 }
 
 uint8_t engine_faults(void)
 {
-    return faults;
+    return engine.faults;
 }
 
 uint32_t command_rpm(const motion_command_t *c)

@@ -40,15 +40,12 @@ step_snapshot_t step_port_snapshot(void);
 /* Ticks since the running period began. */
 uint16_t step_port_counter(void);
 
-/* Turns the silent one-period segment at `offset`, the last but for silence, into one that ends with a pulse, and drops
- * what follows it in the ring. False if it has begun, or is about to: nothing is changed then. */
+/* Turns the silent one-period segment at `offset`, the last but for silence, into one that ends with a pulse (or, with
+ * SEGMENT_SILENT, does not), and drops what follows it in the ring. False if it has begun, or is about to: nothing is changed then. */
 bool step_port_arm(uint8_t offset, uint16_t top, uint16_t match, uint8_t flags);
 
 /* Adds one period to the segment at `offset` and drops what follows it. False if its end is too near. */
 bool step_port_extend(uint8_t offset);
-
-/* Drops what follows the segment at `offset`. False if that has been loaded already. */
-bool step_port_drop_after(uint8_t offset);
 
 /* Lets the segment at `offset` end after at most `periods` more periods and drops what follows it. Returns how many of
  * its periods were dropped. */

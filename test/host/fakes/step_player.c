@@ -580,15 +580,6 @@ bool step_port_extend(uint8_t offset)
     return true;
 }
 
-bool step_port_drop_after(uint8_t offset)
-{
-    uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
-    if ((uint8_t)(after - step_tail) > (uint8_t)(step_head - step_tail))
-        return false;
-    step_head = after;
-    return true;
-}
-
 uint16_t step_port_shorten(uint8_t offset, uint16_t periods)
 {
     segment_t *s = &segments[offset / SEGMENT_BYTES];
