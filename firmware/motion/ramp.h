@@ -29,12 +29,6 @@ typedef struct {
     wide_t k2_q16;
 } ramp_constants_t;
 
-/* A time in units of 2^halved / 16 ticks, and 1/65536 of them. */
-typedef struct {
-    uint32_t whole;
-    uint16_t frac_q16;
-} ramp_root_t;
-
 typedef struct {
     bool linear;
     bool faster;        /* velocity grows from pulse to pulse */
@@ -43,7 +37,7 @@ typedef struct {
     uint8_t group_log2; /* pulses of a group: this power of two, unless fewer are left */
     uint8_t most_log2;  /* the same, at most: less where the bound is near */
     uint16_t ticks;     /* interval in the last group, at most 65535 */
-    uint8_t run_pulses; /* of the last group in several runs */
+    uint8_t run_pulses; /* of the last group in several runs; 0: none yet */
     uint32_t third_q16; /* change of the last group's curve */
     union {
         struct {
@@ -55,10 +49,11 @@ typedef struct {
         struct {
             wide_t x;          /* square of the time from standstill at the next pulse, in units of 2^halved / 16 ticks */
             wide_t c;          /* C in the same */
-            ramp_root_t t;     /* that time */
+            uint32_t t;        /* that time, rounded down */
             ramp_time_t bound; /* no interval above while slowing, none below while speeding up */
             bool bounded;      /* it has been reached: all that is left is equal */
             uint8_t halved;    /* how often units were doubled so that x fits */
+            uint32_t rest;     /* of the last division, for the next one */
         } linear;
     } u;
 } ramp_t;
