@@ -19,7 +19,7 @@
 /* Runs: the interrupt's cycles for two segments, the planner's, and as much for others; and those of each pulse. */
 #define RUN_TICKS 500u
 #define RUN_PULSE_TICKS 24u
-#define RUN_SLOPE_Q6 124u /* change of the interval within a run */
+#define RUN_SLOPE_Q8 496u /* change of the interval within a run */
 
 void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev)
 {
@@ -136,15 +136,10 @@ static NOINLINE uint16_t choose_group(ramp_t *ramp, uint32_t change, uint32_t mo
     }
     if (++log2 > ramp->most_log2)
         log2 = ramp->most_log2;
-    uint16_t pulses = (uint16_t)(1u << log2);
-    uint16_t most_ticks = (uint16_t)((ramp->steep > 1 ? GROUP_MAX_STEEP_TICKS : GROUP_MAX_TICKS) >> log2);
-    change <<= log2;
-    while (log2 && (ticks > most_ticks || change > most_change)) {
-        change >>= 1;
-        most_ticks = (uint16_t)(most_ticks << 1);
-        pulses >>= 1;
+    uint16_t most_ticks = ramp->steep > 1 ? GROUP_MAX_STEEP_TICKS : GROUP_MAX_TICKS;
+    while (log2 && (ticks > most_ticks >> log2 || change > most_change >> log2))
         log2--;
-    }
+    uint16_t pulses = (uint16_t)(1u << log2);
     ramp->group_log2 = log2;
     if (ramp->rest && left <= pulses)
         return left;
@@ -198,8 +193,6 @@ void ramp_begin_harmonic(ramp_t *ramp, const ramp_constants_t *constants, uint32
     ramp->u.harmonic.step2 = 2 * step;
     uint32_t k_by_128 = (uint32_t)wide_from_byte(&constants->k2_q16, 3);
     ramp->steep = step > k_by_128 >> 10 ? 2 : step > k_by_128 / 3072; /* K / 2^17, 2^18.6 */
-    if (ramp->steep > 1)
-        ramp->group_log2 = 2; /* so that the change of a first group fits 32 bits */
     ramp->u.harmonic.step_q40 = step < k_by_128 >> 1 ? ratio_q32(2 * step, 0, k_by_128) : UINT32_MAX;
     set_ticks(ramp, interval_at_twice(constants, 2 * (v_first < v_cap ? v_first : v_cap)).ticks);
 }
@@ -437,41 +430,42 @@ static void divide(ramp_t *ramp, uint16_t pulses, block_t *group)
     uint16_t ticks = ramp->ticks;
     uint8_t halvings = 0;
     if (ticks > RUN_PULSE_TICKS) {
-        uint16_t slope_q6 = slope < 1UL << 26 ? (uint16_t)(slope >> 10) : UINT16_MAX;
+        uint16_t slope_q8 = slope < 1UL << 24 ? (uint16_t)(slope >> 8) : UINT16_MAX;
         uint16_t span = (uint16_t)((ticks - RUN_PULSE_TICKS) * run);
         uint16_t least = (uint16_t)(2 * RUN_TICKS + 2 * RUN_TICKS * ramp->steep);
-        uint16_t most = ticks < BLOCK_SPLIT_TICKS ? RUN_SLOPE_Q6 / 4 : RUN_SLOPE_Q6;
+        uint16_t most = ticks < BLOCK_SPLIT_TICKS ? RUN_SLOPE_Q8 / 4 : RUN_SLOPE_Q8;
         if (odd > 1)
-            slope_q6 = (uint16_t)(slope_q6 / odd);
-        while (run > 1 && slope_q6 > most && span >= least) {
+            slope_q8 = (uint16_t)(slope_q8 / odd);
+        while (run > 1 && slope_q8 > most && span >= least) {
             halvings++;
             run >>= 1;
-            slope_q6 >>= 1;
+            slope_q8 >>= 1;
             span >>= 1;
         }
-        runs = (uint16_t)(runs << halvings);
     }
     ramp->run_pulses = run;
     group->pulses = run;
-    group->runs = (uint8_t)runs;
+    odd = (uint8_t)(odd << halvings);
+    group->runs = odd;
     /* The cubic part: so that two and four runs are right, and of more all nearly. */
-    slope += wide_fraction(ramp->third_q16, runs == 2 ? 1UL << 28 : runs == 4 ? 9UL << 26 : 3UL << 28);
-    if (odd > 1) {
-        uint32_t part = ratio_q32(1, 0, odd);
+    uint8_t cubic_q8 = odd == 2 ? 16 : odd == 4 ? 36 : 48;
+    slope += wide_fraction(ramp->third_q16, (uint32_t)cubic_q8 << 24);
+    if (runs > 1) {
+        uint32_t part = ratio_q32(1, 0, runs);
         slope = wide_fraction(slope, part);
         curve = wide_fraction(wide_fraction(curve, part), part);
     }
     slope >>= halvings;
     curve >>= 2 * halvings;
     /* From the law's to the differences of the runs. */
-    uint32_t sum = curve * (uint16_t)(runs - 1);
+    uint8_t steps = (uint8_t)(odd - 1);
+    uint32_t sum = curve * steps;
+    uint32_t bend = sum - curve;
     slope = ramp->faster ? 0u - slope : slope;
-    slope -= (uint32_t)((int32_t)(sum - curve) >> 1);
+    slope -= (uint32_t)((int32_t)bend >> 1);
     group->slope_q16 = (int32_t)slope;
     group->curve_q16 = (int32_t)curve;
-    group->top_q16 -= 65536u;
-    group->top_q16 -= wide_fraction(sum * (uint16_t)(runs - 2), 715827883u); /* 2^32 / 6 */
-    group->top_q16 -= (uint32_t)((int32_t)(slope * (uint16_t)(runs - 1)) >> 1);
+    group->top_q16 -= 65536u + wide_fraction(bend * steps, 715827883u) + (uint32_t)((int32_t)(slope * steps) >> 1); /* 2^32 / 6 */
 }
 
 uint16_t ramp_next(ramp_t *ramp, const ramp_constants_t *constants, uint32_t left, ramp_time_t *sum, block_t *group)
