@@ -43,20 +43,20 @@ static NOINLINE void divide_k(wide_t *quotient, const ramp_constants_t *constant
     wide_divide(quotient, divisor);
 }
 
-/* The interval at half of v2. */
-static NOINLINE ramp_time_t interval_at_twice(const ramp_constants_t *constants, uint32_t v2)
+/* Of ticks in 1/65536. */
+static void set_time(ramp_time_t *time, const wide_t *q16)
 {
-    wide_t q16;
-    divide_k(&q16, constants, v2);
-    ramp_time_t t;
-    t.ticks = (uint32_t)wide_from_byte(&q16, 2);
-    t.frac_q16 = (uint16_t)q16;
-    return t;
+    time->ticks = (uint32_t)wide_from_byte(q16, 2);
+    time->frac_q16 = (uint16_t)*q16;
 }
 
 ramp_time_t ramp_interval(const ramp_constants_t *constants, uint32_t v)
 {
-    return interval_at_twice(constants, 2 * v);
+    wide_t q16;
+    divide_k(&q16, constants, 2 * v);
+    ramp_time_t time;
+    set_time(&time, &q16);
+    return time;
 }
 
 uint32_t ramp_velocity(const ramp_constants_t *constants, uint32_t ticks)
@@ -66,14 +66,10 @@ uint32_t ramp_velocity(const ramp_constants_t *constants, uint32_t ticks)
     return ((uint32_t)wide_from_byte(&v2_q16, 2) + 1) >> 1;
 }
 
-static void set_q16(ramp_time_t *time, uint32_t q16)
+/* The interval, in 1/65536, to choose the next group by. */
+static NOINLINE void set_ticks(ramp_t *ramp, const wide_t *q16)
 {
-    time->ticks = q16 >> 16;
-    time->frac_q16 = (uint16_t)q16;
-}
-
-static NOINLINE void set_ticks(ramp_t *ramp, uint32_t ticks)
-{
+    uint32_t ticks = (uint32_t)wide_from_byte(q16, 2);
     ramp->ticks = ticks > UINT16_MAX ? UINT16_MAX : (uint16_t)ticks;
 }
 
@@ -159,26 +155,25 @@ static NOINLINE uint16_t choose_group(ramp_t *ramp, uint32_t change, uint32_t mo
 }
 
 /* The shape of a group of intervals with this mean: as those of the law, whose variable changes by part / 2^32 of its
- * value in the group's middle. Returns mean * part^2. */
-static uint32_t shape(ramp_t *ramp, block_t *group, uint32_t mean_q16, uint32_t part)
+ * value in the group's middle. Returns mean * part^2; *third_q16: the change of that. */
+static uint32_t shape(block_t *group, uint32_t *third_q16, uint32_t mean_q16, uint32_t part)
 {
     uint32_t slope = wide_fraction(mean_q16, part);
     uint32_t curve = wide_fraction(slope, part);
     group->slope_q16 = (int32_t)slope;
-    ramp->third_q16 = wide_fraction(curve, part);
+    *third_q16 = wide_fraction(curve, part);
     group->runs = 1; /* to be divided */
     return curve;
 }
 
-/* Intervals that are all alike, *sum each: how many of those left, and their sum. */
-static NOINLINE uint16_t flat(ramp_t *ramp, uint16_t left, ramp_time_t *sum)
+/* Intervals that are all alike: how many of those left, and their sum. */
+static NOINLINE uint16_t flat(ramp_t *ramp, uint16_t left, const wide_t *interval_q16, wide_t *sum_q16)
 {
-    set_ticks(ramp, sum->ticks);
+    set_ticks(ramp, interval_q16);
     uint16_t pulses = choose_group(ramp, 0, 0, left);
     ramp->rest = false;
-    uint32_t frac = (uint32_t)sum->frac_q16 * pulses;
-    sum->ticks = sum->ticks * pulses + (frac >> 16);
-    sum->frac_q16 = (uint16_t)frac;
+    wide_t n = pulses;
+    wide_multiply(sum_q16, &n, interval_q16);
     return pulses;
 }
 
@@ -192,9 +187,12 @@ void ramp_begin_harmonic(ramp_t *ramp, const ramp_constants_t *constants, uint32
     ramp->u.harmonic.cap2 = 2 * v_cap;
     ramp->u.harmonic.step2 = 2 * step;
     uint32_t k_by_128 = (uint32_t)wide_from_byte(&constants->k2_q16, 3);
-    ramp->steep = step > k_by_128 >> 10 ? 2 : step > k_by_128 / 3072; /* K / 2^17, 2^18.6 */
+    uint32_t steep = k_by_128 >> 10; /* K / 2^17; a third: 2^18.6 */
+    ramp->steep = (uint8_t)((step > steep) + (3 * step > steep));
     ramp->u.harmonic.step_q40 = step < k_by_128 >> 1 ? ratio_q32(2 * step, 0, k_by_128) : UINT32_MAX;
-    set_ticks(ramp, interval_at_twice(constants, 2 * (v_first < v_cap ? v_first : v_cap)).ticks);
+    wide_t interval_q16;
+    divide_k(&interval_q16, constants, 2 * (v_first < v_cap ? v_first : v_cap));
+    set_ticks(ramp, &interval_q16);
 }
 
 /* The mean of 1 / (1 + x) over n pulses, x from -p / 2 to p / 2 (not quite: at the pulses), is nearly 1 + second * p^2 /
@@ -218,20 +216,22 @@ static uint32_t series(uint16_t pulses)
     return flash_u32(&series_of[place]);
 }
 
-static uint16_t harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, uint16_t left, ramp_time_t *sum, block_t *group)
+static uint16_t harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, uint16_t left, wide_t *sum_q16, block_t *group,
+                             uint32_t *third_q16)
 {
     uint32_t first2 = ramp->u.harmonic.next2;
     uint32_t cap2 = ramp->u.harmonic.cap2;
     uint32_t step2 = ramp->u.harmonic.step2;
     uint16_t pulses;
     if (first2 > cap2) {
-        *sum = interval_at_twice(constants, cap2);
+        wide_t interval_q16;
+        divide_k(&interval_q16, constants, cap2);
         if (!ramp->faster) {
             uint32_t above = (first2 - cap2) / step2 + 1; /* so many pulses */
             if (above < left)
                 left = (uint16_t)above;
         }
-        pulses = flat(ramp, left, sum);
+        pulses = flat(ramp, left, &interval_q16, sum_q16);
         if (!ramp->faster)
             ramp->u.harmonic.next2 -= step2 * pulses;
         return pulses;
@@ -244,11 +244,11 @@ static uint16_t harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, u
         to_centre2 = 0u - to_centre2;
     }
     ramp->u.harmonic.next2 = first2 + change2;
-    *sum = interval_at_twice(constants, first2 + to_centre2);
+    divide_k(sum_q16, constants, first2 + to_centre2);
     if (pulses > 1) {
-        uint32_t mean = sum->ticks << 16 | sum->frac_q16;
+        uint32_t mean = wide_half(sum_q16, 0);
         uint32_t part = wide_fraction(mean * pulses, ramp->u.harmonic.step_q40) << 8;
-        uint32_t curve = shape(ramp, group, mean, part);
+        uint32_t curve = shape(group, third_q16, mean, part);
         group->curve_q16 = (int32_t)(2 * curve);
         uint32_t factors = series(pulses);
         uint32_t term = curve;
@@ -258,7 +258,7 @@ static uint16_t harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, u
         }
         mean += wide_fraction(curve, factors << 16);
         group->top_q16 = mean;
-        set_q16(sum, mean * pulses);
+        *sum_q16 = mean * pulses;
     }
     return pulses;
 }
@@ -333,11 +333,18 @@ static NOINLINE uint32_t advance(ramp_t *ramp, const wide_t *squares, bool forwa
     return (uint32_t)change;
 }
 
+/* From 1/16. */
+static NOINLINE void set_q4(wide_t *ticks_q16, uint32_t ticks_q4)
+{
+    *ticks_q16 = (wide_t)ticks_q4 << 16;
+    wide_shift(ticks_q16, 4);
+}
+
 void ramp_begin_linear(ramp_t *ramp, const wide_t *c_q8, const wide_t *t_q4, uint32_t pulses, bool faster,
                        ramp_time_t bound)
 {
     begin(ramp, true, faster);
-    ramp->u.linear.bound = bound;
+    ramp->u.linear.bound_q16 = (wide_t)bound.ticks << 16 | bound.frac_q16;
     wide_t *x = &ramp->u.linear.x;
     wide_t *c = &ramp->u.linear.c;
     wide_t n = pulses;
@@ -361,23 +368,19 @@ void ramp_begin_linear(ramp_t *ramp, const wide_t *c_q8, const wide_t *t_q4, uin
     choose_units(ramp);
     ramp->steep = bits_of_c <= STEEP_BITS ? 2 : bits_of_c <= STEEP_BITS + 6;
     /* The first interval, to choose the first group's size. */
-    set_ticks(ramp, advance(ramp, c, true) >> 4);
+    wide_t interval_q16;
+    set_q4(&interval_q16, advance(ramp, c, true));
+    set_ticks(ramp, &interval_q16);
     advance(ramp, c, false);
 }
 
-static bool is_longer(const ramp_time_t *a, const ramp_time_t *b)
+static uint16_t linear_next(ramp_t *ramp, uint16_t left, wide_t *sum_q16, block_t *group,
+                             uint32_t *third_q16)
 {
-    return a->ticks > b->ticks || (a->ticks == b->ticks && a->frac_q16 > b->frac_q16);
-}
-
-static uint16_t linear_next(ramp_t *ramp, uint16_t left, ramp_time_t *sum, block_t *group)
-{
-    if (ramp->u.linear.bounded) {
-        *sum = ramp->u.linear.bound;
-        return flat(ramp, left, sum);
-    }
+    const wide_t *bound_q16 = &ramp->u.linear.bound_q16;
+    if (ramp->u.linear.bounded)
+        return flat(ramp, left, bound_q16, sum_q16);
     bool faster = ramp->faster;
-    const ramp_time_t *bound = &ramp->u.linear.bound;
     for (;;) {
         choose_units(ramp);
         uint32_t begin = ramp->u.linear.t;
@@ -387,18 +390,19 @@ static uint16_t linear_next(ramp_t *ramp, uint16_t left, ramp_time_t *sum, block
         wide_t change;
         wide_multiply(&change, &n, &ramp->u.linear.c);
         uint32_t ticks_q4 = advance(ramp, &change, true);
-        sum->ticks = ticks_q4 >> 4;
-        sum->frac_q16 = (uint16_t)(ticks_q4 << 12);
-        ramp_time_t last = *sum;
+        set_q4(sum_q16, ticks_q4);
+        wide_t last_q16;
+        wide_copy(&last_q16, sum_q16);
         if (pulses > 1) {
-            uint32_t mean = ticks_q4 << 12; /* below 2^32 */
+            uint32_t mean = wide_half(sum_q16, 0);
             mean = pulses & (pulses - 1u) ? mean / pulses : mean >> floor_log2(pulses);
-            group->curve_q16 = (int32_t)(3 * shape(ramp, group, mean, ratio_q32(ticks_q4, halved, (begin + ramp->u.linear.t) >> 1)));
+            group->curve_q16 = (int32_t)(3 * shape(group, third_q16, mean, ratio_q32(ticks_q4, halved, (begin + ramp->u.linear.t) >> 1)));
             group->top_q16 = mean;
             uint32_t half = (uint32_t)group->slope_q16 >> 1;
-            set_q16(&last, faster ? mean - half : mean + half);
+            last_q16 = faster ? mean - half : mean + half;
         }
-        if (faster ? !is_longer(bound, &last) : !is_longer(&last, bound))
+        wide_subtract(&last_q16, bound_q16);
+        if (wide_is_negative(&last_q16) != faster)
             return pulses;
         /* The bound is reached in it: less. */
         if (pulses == 1)
@@ -408,14 +412,14 @@ static uint16_t linear_next(ramp_t *ramp, uint16_t left, ramp_time_t *sum, block
     }
     ramp->u.linear.bounded = true;
     ramp->most_log2 = GROUP_MAX_LOG2;
-    *sum = *bound;
+    wide_copy(sum_q16, bound_q16);
     return 1;
 }
 
 /* -- both -------------------------------------------------------------------------------------------------------- */
 
 /* Divides a group, given by its mean and the law's derivatives in its middle, into runs. */
-static void divide(ramp_t *ramp, uint16_t pulses, block_t *group)
+static void divide(ramp_t *ramp, uint16_t pulses, block_t *group, uint32_t third_q16)
 {
     uint8_t run = 1;
     uint16_t runs = pulses;
@@ -449,7 +453,7 @@ static void divide(ramp_t *ramp, uint16_t pulses, block_t *group)
     group->runs = odd;
     /* The cubic part: so that two and four runs are right, and of more all nearly. */
     uint8_t cubic_q8 = odd == 2 ? 16 : odd == 4 ? 36 : 48;
-    slope += wide_fraction(ramp->third_q16, (uint32_t)cubic_q8 << 24);
+    slope += wide_fraction(third_q16, (uint32_t)cubic_q8 << 24);
     if (runs > 1) {
         uint32_t part = ratio_q32(1, 0, runs);
         slope = wide_fraction(slope, part);
@@ -470,17 +474,20 @@ static void divide(ramp_t *ramp, uint16_t pulses, block_t *group)
 
 uint16_t ramp_next(ramp_t *ramp, const ramp_constants_t *constants, uint32_t left, ramp_time_t *sum, block_t *group)
 {
+    wide_t sum_q16;
+    uint32_t third_q16;
     group->runs = 0;
     uint16_t few = left > 4u << GROUP_MAX_LOG2 ? 4u << GROUP_MAX_LOG2 : (uint16_t)left;
-    uint16_t pulses = ramp->linear ? linear_next(ramp, few, sum, group) : harmonic_next(ramp, constants, few, sum, group);
+    uint16_t pulses = ramp->linear ? linear_next(ramp, few, &sum_q16, group, &third_q16) : harmonic_next(ramp, constants, few, &sum_q16, group, &third_q16);
+    set_time(sum, &sum_q16);
     bool shaped = group->runs != 0;
     group->runs = 0;
     if (pulses == 1) {
-        set_ticks(ramp, sum->ticks);
+        set_ticks(ramp, &sum_q16);
     } else if (shaped) {
         ramp->ticks = (uint16_t)(group->top_q16 >> 16);
         if (!ramp->rest && (ramp->ticks >= BLOCK_SPLIT_TICKS || pulses >= 8))
-            divide(ramp, pulses, group);
+            divide(ramp, pulses, group, third_q16);
     }
     return pulses;
 }

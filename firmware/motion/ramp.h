@@ -38,7 +38,6 @@ typedef struct {
     uint8_t most_log2;  /* the same, at most: less where the bound is near */
     uint16_t ticks;     /* interval in the last group, at most 65535 */
     uint8_t run_pulses; /* of the last group in several runs; 0: none yet */
-    uint32_t third_q16; /* change of the last group's curve */
     union {
         struct {
             uint32_t next2; /* twice the velocity of the next pulse */
@@ -50,7 +49,7 @@ typedef struct {
             wide_t x;          /* square of the time from standstill at the next pulse, in units of 2^halved / 16 ticks */
             wide_t c;          /* C in the same */
             uint32_t t;        /* that time, rounded down */
-            ramp_time_t bound; /* no interval above while slowing, none below while speeding up */
+            wide_t bound_q16;  /* no interval above while slowing, none below while speeding up */
             bool bounded;      /* it has been reached: all that is left is equal */
             uint8_t halved;    /* how often units were doubled so that x fits */
             uint32_t rest;     /* of the last division, for the next one */
