@@ -27,12 +27,18 @@ void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev)
     wide_divide(&constants->k2_q16, steps_per_rev);
 }
 
+void ramp_multiply(wide_t *x, uint32_t factor)
+{
+    wide_t wide_factor = factor;
+    wide_t product;
+    wide_multiply(&product, &wide_factor, x); /* the shorter one first: faster */
+    wide_copy(x, &product);
+}
+
 uint32_t ramp_scale(uint32_t a, uint32_t b, uint32_t divisor)
 {
-    wide_t wide_a = a;
-    wide_t wide_b = b;
-    wide_t product;
-    wide_multiply(&product, &wide_a, &wide_b);
+    wide_t product = a;
+    ramp_multiply(&product, b);
     wide_divide(&product, divisor);
     return (uint32_t)product;
 }
@@ -74,7 +80,7 @@ static NOINLINE void set_ticks(ramp_t *ramp, const wide_t *q16)
 }
 
 /* A new ramp: all 0 but this. */
-static void begin(ramp_t *ramp, bool linear, bool faster)
+static NOINLINE void begin(ramp_t *ramp, bool linear, bool faster)
 {
     memset(ramp, 0, sizeof *ramp);
     ramp->linear = linear;
@@ -172,8 +178,8 @@ static NOINLINE uint16_t flat(ramp_t *ramp, uint16_t left, const wide_t *interva
     set_ticks(ramp, interval_q16);
     uint16_t pulses = choose_group(ramp, 0, 0, left);
     ramp->rest = false;
-    wide_t n = pulses;
-    wide_multiply(sum_q16, &n, interval_q16);
+    wide_copy(sum_q16, interval_q16);
+    ramp_multiply(sum_q16, pulses);
     return pulses;
 }
 
@@ -386,9 +392,9 @@ static uint16_t linear_next(ramp_t *ramp, uint16_t left, wide_t *sum_q16, block_
         uint32_t begin = ramp->u.linear.t;
         uint8_t halved = ramp->u.linear.halved;
         uint16_t pulses = choose_group(ramp, (uint32_t)ramp->ticks >> halved, begin >> 4 >> part_log2(ramp), left);
-        wide_t n = pulses;
         wide_t change;
-        wide_multiply(&change, &n, &ramp->u.linear.c);
+        wide_copy(&change, &ramp->u.linear.c);
+        ramp_multiply(&change, pulses);
         uint32_t ticks_q4 = advance(ramp, &change, true);
         set_q4(sum_q16, ticks_q4);
         wide_t last_q16;

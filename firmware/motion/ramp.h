@@ -79,6 +79,9 @@ void ramp_begin_linear(ramp_t *ramp, const wide_t *c_q8, const wide_t *t_q4, uin
 /* C for a ramp value in hundredths of rad/s^2. factor_log2: microsteps per full step. */
 void ramp_linear_c(wide_t *c_q8, uint16_t steps_per_rev, uint8_t factor_log2, uint32_t accel_centi);
 
+/* x *= factor */
+void ramp_multiply(wide_t *x, uint32_t factor);
+
 /* a * b / divisor, truncated, where that fits 32 bits. divisor >= 1. */
 uint32_t ramp_scale(uint32_t a, uint32_t b, uint32_t divisor);
 
