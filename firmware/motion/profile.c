@@ -16,14 +16,20 @@ void profile_basis(profile_basis_t *basis, uint16_t steps_per_rev, uint8_t facto
     basis->slow_ticks = slow.ticks + (slow.frac_q16 != 0);
 }
 
+/* Velocity and cycle are each other's inverse. */
+static NOINLINE uint32_t inverse(const profile_basis_t *basis, const motion_command_t *command)
+{
+    return basis->us_rpm / command->velocity;
+}
+
 uint32_t profile_rpm(const profile_basis_t *basis, const motion_command_t *command)
 {
-    return command->flags & MOTION_CYCLE ? basis->us_rpm / command->velocity : command->velocity;
+    return command->flags & MOTION_CYCLE ? inverse(basis, command) : command->velocity;
 }
 
 uint32_t profile_cycle_us(const profile_basis_t *basis, const motion_command_t *command)
 {
-    return command->flags & MOTION_CYCLE ? command->velocity : basis->us_rpm / command->velocity;
+    return command->flags & MOTION_CYCLE ? command->velocity : inverse(basis, command);
 }
 
 status_t profile_check(const profile_basis_t *basis, const motion_command_t *command, uint8_t pulse_us)
@@ -35,7 +41,7 @@ status_t profile_check(const profile_basis_t *basis, const motion_command_t *com
         if (command->velocity < shortest_us)
             return STATUS_PERIOD_TOO_SHORT;
     } else if (command->velocity > 1000) { /* slower ones are never too fast: no division in the common case */
-        if (basis->us_rpm / command->velocity < shortest_us)
+        if (inverse(basis, command) < shortest_us)
             return STATUS_PERIOD_TOO_SHORT;
     } else if (basis->us_rpm < shortest_us * command->velocity) {
         return STATUS_PERIOD_TOO_SHORT;
@@ -44,14 +50,6 @@ status_t profile_check(const profile_basis_t *basis, const motion_command_t *com
     if (!(command->flags & MOTION_PULSES))
         most >>= basis->factor_log2;
     return command->count > most ? STATUS_NUMBER_TOO_LARGE : STATUS_OK;
-}
-
-static void multiply(wide_t *x, uint32_t factor)
-{
-    wide_t wide_factor = factor;
-    wide_t product;
-    wide_multiply(&product, &wide_factor, x); /* the shorter one first: faster */
-    wide_copy(x, &product);
 }
 
 static void square(wide_t *x, uint32_t v)
@@ -65,7 +63,7 @@ static void square(wide_t *x, uint32_t v)
 static void linear_steps(wide_t *steps, const profile_basis_t *basis, uint32_t v, uint32_t centi)
 {
     square(steps, v >> basis->factor_log2);
-    multiply(steps, basis->steps_per_rev * (uint32_t)9);
+    ramp_multiply(steps, basis->steps_per_rev * (uint32_t)9);
     wide_divide(steps, 1031324);
     wide_divide(steps, centi);
 }
@@ -109,8 +107,8 @@ uint32_t profile_ramp_steps(const profile_basis_t *basis, uint32_t v_from, uint3
 static void add_change(wide_t *v2, const profile_basis_t *basis, uint32_t pulses, uint32_t centi, bool add)
 {
     wide_t change = pulses;
-    multiply(&change, centi << basis->factor_log2);
-    multiply(&change, 916732); /* 8 * 114591.559 to 5 parts in 10^7 */
+    ramp_multiply(&change, centi << basis->factor_log2);
+    ramp_multiply(&change, 916732); /* 8 * 114591.559 to 5 parts in 10^7 */
     wide_divide(&change, basis->steps_per_rev);
     wide_shift(&change, 3);
     if (add)
@@ -157,7 +155,7 @@ static NOINLINE void limit_peak(profile_t *profile, const profile_basis_t *basis
 }
 
 /* Would the deceleration's pulses leave the velocity above slow speed? */
-static NOINLINE bool is_steep(const profile_t *profile, const profile_basis_t *basis)
+static bool is_steep(const profile_t *profile, const profile_basis_t *basis)
 {
     uint32_t pulses = profile->decel_pulses;
     uint32_t step = (uint32_t)1 << basis->factor_log2;
@@ -185,7 +183,7 @@ static NOINLINE void begin_plan(profile_t *profile, accel_code_t decel, bool lin
 }
 
 /* Splits the count, in full steps or pulses, into phases. True if the ramps had to be truncated. */
-static NOINLINE bool split(profile_t *profile, wide_t *wide_accel, wide_t *wide_decel, uint32_t total)
+static bool split(profile_t *profile, wide_t *wide_accel, wide_t *wide_decel, uint32_t total)
 {
     bool truncated = false;
     uint32_t accel;
@@ -296,7 +294,7 @@ void profile_begin_accel(const profile_t *profile, const profile_basis_t *basis,
         /* From zero to v_start: v / accel = RPM * pi / 30 / (centi / 100) s = units / (100 F) * 2.680825731e9 / centi
          * sixteenths of a tick */
         t = profile->v_start;
-        multiply(&t, 2680825731u);
+        ramp_multiply(&t, 2680825731u);
         wide_divide(&t, profile->accel_centi * 100u << basis->factor_log2);
     }
     /* Whole full steps may pass the target a little: not beyond the interval of the cruise. */
@@ -324,7 +322,7 @@ void profile_begin_decel(const profile_t *profile, const profile_basis_t *basis,
         /* From v_peak to zero in n pulses: t = 2 n interval(v_peak), C = t^2 / n. */
         ramp_time_t interval = ramp_interval(&basis->ramp, profile->v_peak);
         square(&c, interval.ticks << 4 | interval.frac_q16 >> 12);
-        multiply(&c, n << 2);
+        ramp_multiply(&c, n << 2);
     } else {
         ramp_linear_c(&c, basis->steps_per_rev, basis->factor_log2, profile->decel_centi);
     }

@@ -29,12 +29,6 @@ typedef struct {
     wide_t k2_q16;
 } ramp_constants_t;
 
-/* A time in units of 2^halved / 16 ticks, and 1/65536 of them. */
-typedef struct {
-    uint32_t whole;
-    uint16_t frac_q16;
-} ramp_root_t;
-
 typedef struct {
     bool linear;
     bool faster;        /* velocity grows from pulse to pulse */
@@ -43,8 +37,7 @@ typedef struct {
     uint8_t group_log2; /* pulses of a group: this power of two, unless fewer are left */
     uint8_t most_log2;  /* the same, at most: less where the bound is near */
     uint16_t ticks;     /* interval in the last group, at most 65535 */
-    uint8_t run_pulses; /* of the last group in several runs */
-    uint32_t third_q16; /* change of the last group's curve */
+    uint8_t run_pulses; /* of the last group in several runs; 0: none yet */
     union {
         struct {
             uint32_t next2; /* twice the velocity of the next pulse */
@@ -55,10 +48,11 @@ typedef struct {
         struct {
             wide_t x;          /* square of the time from standstill at the next pulse, in units of 2^halved / 16 ticks */
             wide_t c;          /* C in the same */
-            ramp_root_t t;     /* that time */
-            ramp_time_t bound; /* no interval above while slowing, none below while speeding up */
+            uint32_t t;        /* that time, rounded down */
+            wide_t bound_q16;  /* no interval above while slowing, none below while speeding up */
             bool bounded;      /* it has been reached: all that is left is equal */
             uint8_t halved;    /* how often units were doubled so that x fits */
+            uint32_t rest;     /* of the last division, for the next one */
         } linear;
     } u;
 } ramp_t;
@@ -84,6 +78,9 @@ void ramp_begin_linear(ramp_t *ramp, const wide_t *c_q8, const wide_t *t_q4, uin
 
 /* C for a ramp value in hundredths of rad/s^2. factor_log2: microsteps per full step. */
 void ramp_linear_c(wide_t *c_q8, uint16_t steps_per_rev, uint8_t factor_log2, uint32_t accel_centi);
+
+/* x *= factor */
+void ramp_multiply(wide_t *x, uint32_t factor);
 
 /* a * b / divisor, truncated, where that fits 32 bits. divisor >= 1. */
 uint32_t ramp_scale(uint32_t a, uint32_t b, uint32_t divisor);
