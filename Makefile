@@ -36,6 +36,8 @@ FIRMWARE_SRCS := \
     firmware/base/number.c \
     firmware/base/wide.S \
     firmware/base/status.c \
+    firmware/base/crc16.c \
+    firmware/eeprom/store.c \
     firmware/motion/ramp.c \
     firmware/motion/block.c \
     firmware/motion/block.S \
@@ -44,11 +46,13 @@ FIRMWARE_SRCS := \
     firmware/queue/queue.c \
     firmware/queue/session.c \
     firmware/cli/commands.c \
+    firmware/cli/configure.c \
     firmware/cli/display.c \
     firmware/cli/line.c \
     firmware/cli/motion_syntax.c \
     firmware/cli/terminal.c \
     firmware/cli/text.c \
+    firmware/hal/eeprom.c \
     firmware/hal/sleep.c \
     firmware/hal/pins.c \
     firmware/hal/step_isr.S \
@@ -61,19 +65,23 @@ FIRMWARE_SRCS := \
 # Host tests: test/host/<name>.c, one binary a module, with the sources that <name>_SRCS lists; <name>_HOST_SRCS are
 # needed on the host alone, and assembler on the AVR alone.
 
-HOST_TESTS := test_number test_status test_baud test_line test_session test_queue test_motion_syntax test_commands \
-    test_display test_terminal test_wide test_block test_ramp test_profile test_engine test_property_planner
+HOST_TESTS := test_number test_status test_baud test_line test_settings test_store test_session test_queue test_motion_syntax test_commands \
+    test_configure test_display test_terminal test_wide test_block test_ramp test_profile test_engine test_property_planner
 FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
-CLI_SRCS := firmware/cli/commands.c firmware/cli/display.c firmware/cli/text.c firmware/cli/motion_syntax.c \
-    firmware/base/number.c firmware/queue/queue.c firmware/queue/session.c firmware/settings.c $(FAKE_SRCS)
+STORE_SRCS := firmware/eeprom/store.c firmware/base/crc16.c firmware/settings.c test/host/fakes/eeprom_port_fake.c
+CLI_SRCS := firmware/cli/commands.c firmware/cli/configure.c firmware/cli/display.c firmware/cli/text.c firmware/cli/motion_syntax.c \
+    firmware/base/number.c firmware/queue/queue.c firmware/queue/session.c $(STORE_SRCS) $(FAKE_SRCS)
 test_number_SRCS := firmware/base/number.c
 test_status_SRCS := firmware/base/status.c
 test_line_SRCS := firmware/cli/line.c
+test_settings_SRCS := firmware/settings.c
+test_store_SRCS := $(STORE_SRCS)
 test_session_SRCS := firmware/queue/session.c firmware/settings.c
 test_queue_SRCS := firmware/queue/queue.c firmware/queue/session.c firmware/settings.c $(FAKE_SRCS)
 test_motion_syntax_SRCS := firmware/cli/motion_syntax.c firmware/base/number.c firmware/queue/session.c \
     firmware/settings.c $(FAKE_SRCS)
 test_commands_SRCS := $(CLI_SRCS)
+test_configure_SRCS := $(CLI_SRCS)
 test_display_SRCS := $(CLI_SRCS)
 test_terminal_SRCS := $(CLI_SRCS) firmware/cli/terminal.c firmware/cli/line.c firmware/base/status.c
 test_wide_SRCS := firmware/base/wide.S

@@ -1,6 +1,7 @@
 #include "cli/commands.h"
 #include "base/flash.h"
 #include "base/inline.h"
+#include "cli/configure.h"
 #include "cli/display.h"
 #include "cli/motion_syntax.h"
 #include "cli/timebase_port.h"
@@ -184,6 +185,23 @@ static status_t command_toggle_steps(const char *rest)
     return STATUS_OK;
 }
 
+static status_t command_configure(const char *rest)
+{
+    return configure_command(rest);
+}
+
+static status_t command_show_configuration(const char *rest)
+{
+    (void)rest;
+    return display_request(DISPLAY_CONFIGURE);
+}
+
+static status_t command_show_eeprom(const char *rest)
+{
+    (void)rest;
+    return display_request(DISPLAY_EEPROM);
+}
+
 static status_t command_later(const char *rest)
 {
     (void)rest;
@@ -258,6 +276,7 @@ static status_t dispatch(const char *line)
 void commands_init(void)
 {
     session_init();
+    configure_init();
     debugging = false;
     characters_ahead = 0;
 }
@@ -304,6 +323,10 @@ static NOINLINE status_t execute_by_table(const char *line)
 status_t commands_execute(const char *line, uint8_t length)
 {
     commands_read_ahead(line, length);
+    if (configure_mode()) {
+        characters_ahead = 0;
+        return configure_line(line);
+    }
     const bool complete = characters_ahead != 0 && ahead.status == STATUS_OK;
     characters_ahead = 0;
     /* What was read ahead without an error needs no search: time counts. (vd is an error there.) */
@@ -315,9 +338,14 @@ const char *commands_refused_range(void)
     return refused_range;
 }
 
+void commands_refuse_range(const char *range)
+{
+    refused_range = range;
+}
+
 bool commands_at_once(char character)
 {
-    const bool pulse = character == '+' || character == '-';
+    const bool pulse = (character == '+' || character == '-') && !configure_mode();
     if (pulse) {
         engine_single_pulse(character == '-');
     }

@@ -1,8 +1,10 @@
 #include "cli/display.h"
 #include "base/flash.h"
 #include "cli/commands.h"
+#include "cli/configure.h"
 #include "cli/terminal_port.h"
 #include "cli/text.h"
+#include "eeprom/store.h"
 #include "motion/engine.h"
 #include "queue/queue.h"
 #include "queue/session.h"
@@ -38,6 +40,7 @@ _Static_assert((SHOWN_GAP & SESSION_FLAGS) == 0, "a flag of its own");
 #define POSITION "\x8B"
 #define STATE "\x8C"
 #define FAULTS "\x8D"
+#define SETTING_CELL "\x8E"
 enum {
     FIELD_COUNT = 0x80,
     FIELD_RPM,
@@ -53,6 +56,7 @@ enum {
     FIELD_POSITION,
     FIELD_STATE,
     FIELD_FAULTS,
+    FIELD_SETTING_CELL,
 };
 
 /* A choice between two texts: the first one if the command has the flag that is in these bits of the character. */
@@ -93,10 +97,14 @@ static const char defaults_text[] FLASH =
 static const char velocity_text[] FLASH = VELOCITY "\r\n";
 static const char position_text[] FLASH = "position " POSITION " " STATE " faults " FAULTS "\r\n";
 
+static const char configure_text[] FLASH = "Config:\r\n";
+static const char cell_text[] FLASH = SETTING_CELL;
+
 /* What each display begins with. */
 static const char *const texts[] FLASH = {
     [DISPLAY_QUEUE] = queue_text,       [DISPLAY_DEFAULTS] = defaults_text, [DISPLAY_VELOCITY] = velocity_text,
     [DISPLAY_POSITION] = position_text, [DISPLAY_HELP] = commands_help,
+    [DISPLAY_CONFIGURE] = configure_text, [DISPLAY_EEPROM] = cell_text,
 };
 
 /* Indexed by motion_state_t. */
@@ -114,7 +122,7 @@ static void shown_command(motion_command_t *command)
     }
 }
 
-static void put_accel(accel_code_t code)
+void display_put_accel(accel_code_t code)
 {
     if (code < ACCEL_CODE_WHOLE) {
         text_put_decimal(code, 2);
@@ -131,8 +139,8 @@ static void print_field(uint8_t field, const motion_command_t *command)
     case FIELD_COUNT: number = command->count; break;
     case FIELD_RPM: number = command_rpm(command); break;
     case FIELD_CYCLE: number = command_cycle_us(command); break;
-    case FIELD_ACCEL: put_accel(command->accel); return;
-    case FIELD_DECEL: put_accel(command->decel); return;
+    case FIELD_ACCEL: display_put_accel(command->accel); return;
+    case FIELD_DECEL: display_put_accel(command->decel); return;
     case FIELD_EXTRA: number = command->extra_pulses; break;
     case FIELD_WAIT: number = command->start_wait_us; break;
     case FIELD_ROW: number = row; break;
@@ -151,6 +159,7 @@ static void print_field(uint8_t field, const motion_command_t *command)
             number = 0u - number;
         }
         break;
+    case FIELD_SETTING_CELL: configure_put_cell(current == DISPLAY_CONFIGURE); return;
     case FIELD_STATE: text_put_flash(state_words[engine_state()]); return;
     default: number = engine_faults(); break;
     }
@@ -162,6 +171,7 @@ static void begin(uint8_t display)
     current = display;
     text = flash_pointer(&texts[display]);
     row = commands_debugging() ? UINT8_MAX : 0; /* position 0 is shown in debug mode only */
+    configure_first_cell();
     shown_session = session;
     if (engine_gap()) {
         shown_session.flags |= SHOWN_GAP;
@@ -181,6 +191,8 @@ static void next_text(void)
         } else if (row == QUEUE_LAST + 2 && commands_debugging()) {
             text = queue_executing_text;
         }
+    } else if (current >= DISPLAY_CONFIGURE && configure_has_cell(current == DISPLAY_CONFIGURE)) {
+        text = cell_text;
     }
     if (text == 0 && waiting_count > 0) {
         begin(waiting[0]);
@@ -260,7 +272,8 @@ bool display_active(void)
 
 bool display_poll(void)
 {
-    if (!display_active() || terminal_port_free() < TEXT_PIECE_BYTES) {
+    if (!display_active() || terminal_port_free() < TEXT_PIECE_BYTES ||
+        (current >= DISPLAY_CONFIGURE && store_busy())) {
         return false;
     }
     print_piece();

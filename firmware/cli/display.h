@@ -13,6 +13,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include "base/status.h"
+#include "motion/command.h"
 
 typedef enum {
     DISPLAY_QUEUE,    /* q */
@@ -20,6 +21,8 @@ typedef enum {
     DISPLAY_VELOCITY, /* vd */
     DISPLAY_POSITION, /* p */
     DISPLAY_HELP,     /* ? */
+    DISPLAY_CONFIGURE, /* $C, cc; from here on: what is stored, when nothing is being written */
+    DISPLAY_EEPROM,    /* $E */
 } display_t;
 
 #define DISPLAY_WAITING 4
@@ -27,6 +30,7 @@ typedef enum {
 void display_init(void);
 status_t display_request(display_t display);
 bool display_active(void); /* something is being printed or waits */
+void display_put_accel(accel_code_t code);
 bool display_poll(void);   /* prints the next piece; true if it did */
 
 #endif

@@ -19,6 +19,7 @@ static const char version_line[] FLASH = "SAC " VERSION_NUMBER " " VERSION_DATE 
 static const char prompt[] FLASH = "SAC>";
 
 static line_t line;
+static bool held;      /* it is whole, and waits for what is being stored */
 static uint8_t echoed; /* how many characters of the line stand on the screen */
 
 /* What is owed while answers are held back. */
@@ -148,6 +149,11 @@ static NOINLINE void end_line(void)
     } else {
         commands_read_ahead(line.text, 0);
     }
+    held = status == STATUS_WAIT;
+    if (held) {
+        timing = false;
+        return;
+    }
     if (timed && commands_debugging()) {
         note_loaded();
     }
@@ -171,6 +177,7 @@ static NOINLINE bool begin_line(uint8_t byte)
 void terminal_init(void)
 {
     line_reset(&line);
+    held = false;
     echoed = 0;
     behind = false;
     owes_new_line = false;
@@ -208,7 +215,7 @@ bool terminal_poll(void)
     uint8_t bytes = BYTES_AT_ONCE; /* still to be taken in this round */
     bool worked = false;
     for (uint8_t lines = PRESSED_LINES; lines > 0; lines--) {
-        const line_event_t event = take(&bytes);
+        const line_event_t event = held ? LINE_ENDED : take(&bytes);
         if (event == LINE_ERASED) {
             erase();
         }
