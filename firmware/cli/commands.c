@@ -185,11 +185,6 @@ static status_t command_toggle_steps(const char *rest)
     return STATUS_OK;
 }
 
-static status_t command_configure(const char *rest)
-{
-    return configure_command(rest);
-}
-
 static status_t command_show_configuration(const char *rest)
 {
     (void)rest;
@@ -314,6 +309,9 @@ static NOINLINE status_t execute_by_table(const char *line)
     if (is_end(line[0])) {
         return STATUS_OK;
     }
+    if (configure_mode()) {
+        return configure_line(line);
+    }
     if (line[0] == '$') {
         queue_stop();
     }
@@ -323,11 +321,7 @@ static NOINLINE status_t execute_by_table(const char *line)
 status_t commands_execute(const char *line, uint8_t length)
 {
     commands_read_ahead(line, length);
-    if (configure_mode()) {
-        characters_ahead = 0;
-        return configure_line(line);
-    }
-    const bool complete = characters_ahead != 0 && ahead.status == STATUS_OK;
+    const bool complete = characters_ahead != 0 && ahead.status == STATUS_OK && !configure_mode();
     characters_ahead = 0;
     /* What was read ahead without an error needs no search: time counts. (vd is an error there.) */
     return complete ? command_read_ahead(line) : execute_by_table(line);

@@ -35,47 +35,49 @@ static const char ranges[] FLASH =
 #undef SETTING_KIND
     ;
 
-typedef struct {
-    char letter;
-    uint8_t offset; /* in settings_t */
-    uint8_t kind;
-} row_t;
+/* Bytes, one row behind the other. A pointer to a row is to its letter; these follow. */
+enum { ROW_OFFSET = 1, ROW_KIND, ROW_NAME };
 
-static const row_t rows[] FLASH = {
+static const struct {
 #define SETTING(letter, type, member, kind, factory, name) \
-    {letter, offsetof(settings_t, SETTING_PLACE_##type(member)), KIND_##kind},
+    struct {                                               \
+        char its_letter;                                   \
+        uint8_t offset, its_kind; /* in settings_t */      \
+        char its_name[sizeof name];                        \
+    } type##_##member;
 #include "settings.def"
 #undef SETTING
+    char end;
+} rows FLASH = {
+#define SETTING(letter, type, member, kind, factory, name) \
+    {letter, offsetof(settings_t, SETTING_PLACE_##type(member)), KIND_##kind, name},
+#include "settings.def"
+#undef SETTING
+    '\0',
 };
-enum { ROWS = sizeof rows / sizeof rows[0] };
 
-static const char names[] FLASH =
-#define SETTING(letter, type, member, kind, factory, name) name "\0"
-#include "settings.def"
-#undef SETTING
-    ;
-
-static const char *nth(const char *text, uint8_t n)
+/* Behind the NUL. */
+static const char *next_text(const char *text)
 {
-    while (n > 0) {
-        if (flash_u8(text++) == '\0') {
-            n--;
-        }
+    while (flash_u8(text++) != '\0') {
     }
     return text;
 }
 
-/* ROWS: there is none. */
-static uint8_t find(char letter, row_t *row)
+/* The letter's row, in flash; 0: there is none. */
+static NOINLINE const char *find(uint8_t letter)
 {
-    uint8_t i = 0;
-    for (; i < ROWS; i++) {
-        FLASH_COPY(row, &rows[i], sizeof *row);
-        if (row->letter == letter) {
-            break;
+    const char *row = (const char *)&rows;
+    for (;;) {
+        const uint8_t its_letter = flash_u8(row);
+        if (its_letter == letter) {
+            return row;
         }
+        if (its_letter == '\0') {
+            return 0;
+        }
+        row = next_text(row + ROW_NAME);
     }
-    return i;
 }
 
 static uint8_t bytes_of(uint8_t kind)
@@ -92,106 +94,81 @@ static bool is_end(char c)
     return c == '\0' || c == ' ';
 }
 
-/* A number in hundredths as an accel code; places: of its decimals, NO_POINT or more without a point. */
-enum { NO_POINT = 0x80 };
-
-static bool to_accel_code(uint32_t *value, uint8_t places)
+/* <letter><value> */
+static NOINLINE status_t set(const char *text)
 {
-    if (places >= NO_POINT) {
-        if (*value >= 100) {
-            const bool valid = *value <= 999;
-            *value += ACCEL_CODE_WHOLE - 100;
-            return valid;
+    enum { NO_POINT = 0x80 };
+    const char *row = find((uint8_t)*text);
+    if (row == 0) {
+        return STATUS_UNKNOWN_COMMAND;
+    }
+    const uint8_t kind = flash_u8(row + ROW_KIND);
+    uint8_t offset = flash_u8(row + ROW_OFFSET);
+    const char *range = ranges;
+    for (uint8_t i = kind; i > 0; i--) {
+        range = next_text(range);
+    }
+    commands_refuse_range(range); /* told with STATUS_RANGE only */
+    if (kind == KIND_MAP) {
+        const uint8_t entry = (uint8_t)(*++text - '0');
+        if (entry > 7) {
+            return STATUS_RANGE;
         }
-        places = 0;
+        offset = (uint8_t)(offset + entry);
     }
-    for (; places < 2; places++) {
-        number_add_digit(value, 0); /* if there is no room for it it is out of range anyway */
-    }
-    return places == 2 && *value != 0 && *value < ACCEL_CODE_WHOLE;
-}
 
-/* The limits of its kind stand in the text that is told. */
-static bool is_in_range(uint32_t value, uint8_t kind)
-{
+    /* The number: of a ramp value, the places behind its point are counted. */
+    uint32_t value = 0;
+    uint8_t places = NO_POINT;
+    uint8_t c = (uint8_t)*++text;
+    if (is_end((char)c)) {
+        return STATUS_NUMBER_MISSING;
+    }
+    do {
+        if (c == '.' && kind == KIND_RAMP && places >= NO_POINT) {
+            places = 0;
+        } else if (c < '0' || c > '9' || places == 2) {
+            return STATUS_SYNTAX;
+        } else if (!number_add_digit(&value, (uint8_t)(c - '0'))) {
+            return STATUS_NUMBER_TOO_LARGE;
+        } else {
+            places++;
+        }
+        c = (uint8_t)*++text;
+    } while (!is_end((char)c));
+
+    /* The limits stand in the text: of a ramp value, 1 hundredth and 999 wholes. */
     uint32_t least = 0, most = 0;
-    for (const char *range = nth(ranges, kind);; range++) {
-        const uint8_t c = flash_u8(range);
-        if (c == '\0') {
-            break;
-        }
-        if (c >= '0') {
+    while ((c = flash_u8(range++)) != '\0') {
+        if (c >= '0' && c <= '9') {
             number_add_digit(&most, (uint8_t)(c - '0'));
         } else if (most != 0) {
             least = most;
             most = 0;
         }
     }
-    return value >= least && value <= most;
-}
-
-static status_t read_value(const char *text, uint8_t kind, uint32_t *value)
-{
-    uint8_t places = NO_POINT;
-    *value = 0;
-    if (is_end(*text)) {
-        return STATUS_NUMBER_MISSING;
-    }
-    for (; !is_end(*text); text++) {
-        const uint8_t digit = (uint8_t)(*text - '0');
-        if (digit < 10) {
-            if (!number_add_digit(value, digit)) {
-                return STATUS_NUMBER_TOO_LARGE;
-            }
-            places++;
-        } else if (*text == '.' && kind == KIND_RAMP && places >= NO_POINT) {
-            places = 0;
+    uint16_t to_code = 0;
+    if (kind == KIND_RAMP) {
+        if (places >= NO_POINT && value >= 100) {
+            to_code = ACCEL_CODE_WHOLE - 100;
         } else {
-            return STATUS_SYNTAX;
+            if (places >= NO_POINT) {
+                places = 0;
+            }
+            for (; places < 2; places++) {
+                number_add_digit(&value, 0); /* if there is no room for it it is out of range anyway */
+            }
+            most = ACCEL_CODE_WHOLE - 1;
         }
+    } else if (kind == KIND_OPS && value != 0) {
+        least = most;
+    } else if (kind <= KIND_AUTORUN && value > most) {
+        value = most;
     }
-    bool valid = true;
-    if (kind <= KIND_DIRECTION) {
-        *value = *value != 0;
-    } else if (kind == KIND_AUTORUN) {
-        if (*value > QUEUE_LAST) {
-            *value = QUEUE_LAST;
-        }
-    } else if (kind == KIND_RAMP) {
-        valid = to_accel_code(value, places);
-    } else if (kind != KIND_OPS || *value != 0) {
-        valid = is_in_range(*value, kind);
+    if (value < least || value > most) {
+        return STATUS_RANGE;
     }
-    return valid ? STATUS_OK : STATUS_RANGE;
-}
-
-static status_t set(const char *text)
-{
-    row_t row;
-    uint32_t value;
-    status_t status = STATUS_RANGE;
-    if (find(*text++, &row) == ROWS) {
-        return STATUS_UNKNOWN_COMMAND;
-    }
-    if (row.kind == KIND_MAP) {
-        const uint8_t entry = (uint8_t)(*text - '0');
-        if (entry < 8) {
-            text++;
-            row.offset = (uint8_t)(row.offset + entry);
-            status = STATUS_OK;
-        }
-    } else {
-        status = STATUS_OK;
-    }
-    if (status == STATUS_OK) {
-        status = read_value(text, row.kind, &value);
-    }
-    if (status == STATUS_OK) {
-        status = store_change(row.offset, bytes_of(row.kind), value);
-    } else {
-        commands_refuse_range(nth(ranges, row.kind)); /* told with STATUS_RANGE only */
-    }
-    return status;
+    return store_change(offset, bytes_of(kind), value + to_code);
 }
 
 /* -- commands --------------------------------------------------------------------------------------------------------- */
@@ -206,7 +183,7 @@ bool configure_mode(void)
     return configuring;
 }
 
-status_t configure_command(const char *rest)
+status_t command_configure(const char *rest)
 {
     if (!is_end(*rest)) {
         return set(rest);
@@ -217,24 +194,21 @@ status_t configure_command(const char *rest)
 
 status_t configure_line(const char *line)
 {
-    if (is_end(*line)) {
-        return STATUS_OK;
-    }
-    if (!is_end(line[1])) {
-        const status_t status = set(line);
-        if (status == STATUS_OK) {
-            (void)display_request(DISPLAY_CONFIGURE); /* it is stored, even if there is no room for one more display */
+    if (is_end(line[1])) {
+        if (*line == 'S') {
+            queue_stop();
+            return STATUS_OK;
         }
-        return status;
+        if ((*line | 0x20) == 'x') {
+            configuring = false;
+            return STATUS_OK;
+        }
     }
-    if (*line == 'S') {
-        queue_stop();
-    } else if ((*line | 0x20) == 'x') {
-        configuring = false;
-    } else {
-        return set(line); /* says what is wrong */
+    const status_t status = set(line);
+    if (status == STATUS_OK) {
+        (void)display_request(DISPLAY_CONFIGURE); /* it is stored, even if there is no room for one more display */
     }
-    return STATUS_OK;
+    return status;
 }
 
 /* -- screen and list -------------------------------------------------------------------------------------------------- */
@@ -253,30 +227,30 @@ bool configure_has_cell(bool screen)
     return cell < (screen ? SCREEN_CELLS : commands_debugging() ? LETTERS + EEPROM_BYTES : LETTERS);
 }
 
-static void put_value(const row_t *row)
+static void put_value(const char *row)
 {
+    uint8_t offset = flash_u8(row + ROW_OFFSET);
+    const uint8_t kind = flash_u8(row + ROW_KIND);
     uint32_t value = 0;
-    for (uint8_t i = bytes_of(row->kind); i-- > 0;) {
-        ((uint8_t *)&value)[i] = store_setting((uint8_t)(row->offset + i));
+    for (uint8_t i = 0; i < bytes_of(kind); i++) {
+        ((uint8_t *)&value)[i] = store_setting(offset++);
     }
-    if (row->kind == KIND_DIRECTION) {
-        text_put_flash(value != 0 ? FLASH_TEXT("CCW") : FLASH_TEXT("CW"));
-        return;
-    }
-    if (row->kind == KIND_RAMP) {
+    if (kind == KIND_DIRECTION) {
+        text_put_flash(FLASH_TEXT("CCW") + (value == 0));
+    } else if (kind == KIND_RAMP) {
         display_put_accel((accel_code_t)value);
-        return;
-    }
-    if (row->kind == KIND_OPS && value != 0) {
-        value = 100100; /* in binary; there is no other */
-    }
-    if (row->kind == KIND_MAP) {
-        for (uint8_t i = 1; i < 8; i++) {
-            terminal_port_put((uint8_t)('0' + value));
-            value = store_setting((uint8_t)(row->offset + i));
+    } else {
+        if (kind == KIND_OPS && value != 0) {
+            value = 100100; /* in binary; there is no other */
         }
+        if (kind == KIND_MAP) {
+            for (uint8_t i = 1; i < 8; i++) {
+                terminal_port_put((uint8_t)('0' + value));
+                value = store_setting(offset++);
+            }
+        }
+        text_put_u32(value);
     }
-    text_put_u32(value);
 }
 
 static void put_hex_digit(uint8_t digit)
@@ -298,16 +272,14 @@ static void put_byte(uint16_t address)
 }
 
 /* The name and the tabs behind it: values stand in column 16, or 40. */
-static void put_name(uint8_t i)
+static void put_name(const char *name)
 {
     uint8_t column = 1;
-    const char *name = nth(names, i);
-    if (flash_u8(name) != '\0') {
-        terminal_port_put(' ');
-        for (uint8_t c; (c = flash_u8(name)) != '\0'; name++) {
-            terminal_port_put(c);
-            column++;
+    for (uint8_t c; (c = flash_u8(name++)) != '\0'; column++) {
+        if (column == 1) {
+            terminal_port_put(' ');
         }
+        terminal_port_put(c);
     }
     terminal_port_put('\t');
     if (column < 7) {
@@ -320,29 +292,35 @@ void configure_put_cell(bool screen)
 {
     const uint16_t at = cell++;
     uint8_t letter = (uint8_t)(at + 'A');
+    bool line_ends = true;
     if (screen) {
-        letter = (uint8_t)((at >> 1) + (at & 1 ? 'a' : 'A'));
+        letter = (uint8_t)((at >> 1) + 'A');
+        line_ends = at & 1;
+        if (line_ends) {
+            letter |= 0x20;
+        }
     } else if (at >= LETTERS) {
         put_byte(at - LETTERS);
         return;
     }
-    row_t row;
-    const uint8_t i = find((char)letter, &row);
-    if (i < ROWS) {
-        if (screen && letter >= 'a') {
+    const char *row = find(letter);
+    if (row != 0) {
+        if (screen && line_ends) {
             terminal_port_put('\t');
         }
         terminal_port_put(letter);
         if (screen) {
-            put_name(i);
+            put_name(row + ROW_NAME);
         } else {
             terminal_port_put(' ');
         }
-        if (!screen || row.kind != KIND_BLANK_FLAG || store_setting(row.offset) != 0) {
-            put_value(&row);
+        if (!screen || letter != 'D' || store_setting(flash_u8(row + ROW_OFFSET)) != 0) {
+            put_value(row);
         }
+    } else if (!screen) {
+        return;
     }
-    if (screen ? letter >= 'a' : i < ROWS) {
+    if (line_ends) {
         text_new_line();
     }
 }

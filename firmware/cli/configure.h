@@ -16,7 +16,7 @@
 void configure_init(void); /* not in configure mode */
 
 /* What follows $C: nothing enters the configure mode and asks for the screen; a letter and a value store it. */
-status_t configure_command(const char *rest);
+status_t command_configure(const char *rest);
 
 bool configure_mode(void); /* every line is an entry of the screen */
 

@@ -301,7 +301,7 @@ static void test_what_is_out_of_range_is_refused_and_its_range_told(void)
         {'b', "2..4294967295", {"2", "4294967295"}, {"0", "1"}},
         {'c', "1..6400000", {"1", "6400000"}, {"0", "6400001", "4294967295"}},
         {'d', "0.01..999", {".01", "99.99", "100", "999", "0.5", "5."}, {"0", "0.00", "1000", "100.5", "4294967295", "."}},
-        {'g', "0.01..999", {"00.01", "10.47", "999"}, {"1.255", "999.01", "4294957396", "42949672.95", "4294967295.", "."}},
+        {'g', "0.01..999", {"00.01", "10.47", "999"}, {"999.01", "100.00", "4294957396", "42949672.95", "4294967295.", "."}},
         {'h', "0 or 36", {"0", "36"}, {"1", "35", "37", "4", "32", "292"}},
         {'m', "300..2000000", {"300", "57600", "2000000"}, {"0", "299", "2000001"}},
         {'n', "300..38400", {"300", "38400"}, {"0", "299", "38401", "65536"}},
@@ -334,6 +334,7 @@ static void test_what_is_no_entry_is_refused(void)
     assert_refused(STATUS_SYNTAX, NULL, "$CA-8");
     assert_refused(STATUS_SYNTAX, NULL, "$CA8.0");
     assert_refused(STATUS_SYNTAX, NULL, "$Cd1.2.5");
+    assert_refused(STATUS_SYNTAX, NULL, "$Cd1.255"); /* two places, all that is kept */
     assert_refused(STATUS_SYNTAX, NULL, "$Cd-1");
     assert_refused(STATUS_SYNTAX, NULL, "$CGCCW");
     assert_refused(STATUS_NUMBER_TOO_LARGE, NULL, "$CE4294967296");
@@ -341,6 +342,7 @@ static void test_what_is_no_entry_is_refused(void)
     assert_refused(STATUS_RANGE, "0..7", "$CU81");
     assert_refused(STATUS_RANGE, "0..7", "$CU28");
     assert_refused(STATUS_RANGE, "0..7", "$CU211");
+    assert_refused(STATUS_RANGE, "0..7", "$CU");
     assert_refused(STATUS_NUMBER_MISSING, NULL, "$CU2");
 }
 
