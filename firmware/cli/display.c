@@ -272,10 +272,11 @@ bool display_active(void)
 
 bool display_poll(void)
 {
-    if (!display_active() || terminal_port_free() < TEXT_PIECE_BYTES ||
-        (current >= DISPLAY_CONFIGURE && store_busy())) {
+    if (!display_active() || terminal_port_free() < TEXT_PIECE_BYTES) {
         return false;
     }
-    print_piece();
+    if (current < DISPLAY_CONFIGURE || !store_busy()) {
+        print_piece();
+    }
     return true;
 }

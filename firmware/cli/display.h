@@ -31,6 +31,6 @@ void display_init(void);
 status_t display_request(display_t display);
 bool display_active(void); /* something is being printed or waits */
 void display_put_accel(accel_code_t code);
-bool display_poll(void);   /* prints the next piece; true if it did */
+bool display_poll(void);   /* prints the next piece; true if it did, or waits for what is being stored */
 
 #endif

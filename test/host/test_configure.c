@@ -180,9 +180,10 @@ static void test_the_screen_waits_for_the_port_and_for_what_is_being_stored(void
 {
     TEST_ASSERT_EQUAL(STATUS_OK, commands_execute("$CK30", 5));
     TEST_ASSERT_EQUAL(STATUS_OK, commands_execute("cc", 2));
-    TEST_ASSERT_FALSE(display_poll());
-    finish();
     terminal_port_fake_clear();
+    TEST_ASSERT_TRUE(display_poll()); /* no prompt meanwhile */
+    TEST_ASSERT_EQUAL_STRING("", terminal_port_fake_text());
+    finish();
     terminal_port_fake_hold(1);
     for (int i = 0; display_active(); i++) {
         TEST_ASSERT_LESS_THAN_INT(2000, i);
