@@ -5,25 +5,24 @@
 #include "eeprom/eeprom_port.h"
 #include "settings.h"
 
-/* A record is addressed by an index that counts upward; the copy at the end of the EEPROM lies mirrored. */
-#define MIRROR (EEPROM_BYTES - 1u)
-
 enum {
+    OTHER_COPY = 64, /* the bit in which the addresses of the copies differ: 0 and 64 */
+    QUEUE_FIRST = 192,
     NOT_VALID = 0x00,
-    ERASED = 0xFF,
-    QUEUE_MARK = 1, /* at both ends */
+    ERASED = 0xFF, /* as every mark with the highest bit: not valid */
+    QUEUE_MARK = 0x01, /* at both ends */
+    SEQUENCE = 0x3F,   /* of the settings: counted in these bits, */
+    SEQUENCE_MARK = 0x40, /* beside this one */
     SETTINGS_BYTES = sizeof(settings_t),
-    QUEUE_FIRST = 64,
     QUEUE_BYTES = STORE_QUEUE_BYTES + 1,
-    QUEUE_END = QUEUE_FIRST + QUEUE_BYTES, /* of its end mark */
     CHECKSUM_BYTES = 2,
 };
-_Static_assert(1 + SETTINGS_BYTES + CHECKSUM_BYTES <= QUEUE_FIRST, "the first copy ends before the snapshot");
-_Static_assert(QUEUE_END + CHECKSUM_BYTES < EEPROM_BYTES - QUEUE_FIRST, "the snapshot ends before the other copy");
+_Static_assert(1 + SETTINGS_BYTES + CHECKSUM_BYTES <= OTHER_COPY, "a copy ends before the next one");
+_Static_assert(QUEUE_FIRST + 1 + QUEUE_BYTES + CHECKSUM_BYTES <= EEPROM_BYTES, "all fits in");
 
 /* The newest valid copy of the settings. */
 static uint8_t sequence; /* its mark; NOT_VALID: there is none */
-static uint16_t mirror;  /* what its indexes are mirrored by: 0 or MIRROR */
+static uint8_t newest;   /* its address: 0 or OTHER_COPY */
 
 /* What is to be written: done in this order. */
 enum { JOB_ERASE = 1 << 0, JOB_SETTINGS = 1 << 1, JOB_QUEUE = 1 << 2 };
@@ -37,26 +36,21 @@ static uint8_t change_offset, change_bytes;
 static uint32_t change_value;
 static const uint8_t *queue;
 
-static uint8_t read(uint16_t index, uint16_t mirrored)
+/* The mark of the record at that address, or NOT_VALID. */
+static NOINLINE uint8_t valid_mark(uint8_t first, uint16_t bytes)
 {
-    return eeprom_port_read(index ^ mirrored);
-}
-
-/* The mark of a record, or NOT_VALID. */
-static NOINLINE uint8_t valid_mark(uint16_t first, uint16_t bytes, uint16_t mirrored)
-{
+    const uint8_t mark = eeprom_port_read(first);
     uint16_t crc = STORE_LAYOUT;
-    for (uint16_t i = 0; i < 1 + bytes + CHECKSUM_BYTES; i++) {
-        crc = crc16_add(crc, read(first + i, mirrored));
+    uint16_t address = first;
+    for (uint16_t left = bytes + (1 + CHECKSUM_BYTES); left > 0; left--) {
+        crc = crc16_add(crc, eeprom_port_read(address++));
     }
-    const uint8_t mark = read(first, mirrored);
-    return crc == 0 && mark != ERASED ? mark : NOT_VALID;
+    return crc == 0 && mark < 0x80 ? mark : NOT_VALID;
 }
 
 static uint8_t next_sequence(void)
 {
-    const uint8_t next = (uint8_t)(sequence + 1);
-    return next == ERASED ? 1 : next;
+    return (uint8_t)(((sequence + 1) & SEQUENCE) | SEQUENCE_MARK);
 }
 
 #ifdef __AVR__
@@ -68,12 +62,12 @@ bool store_load_settings(void)
     while (eeprom_port_busy()) {
         /* a reset other than a loss of power does not end a write: at most 3.4 ms */
     }
-    sequence = valid_mark(0, SETTINGS_BYTES, MIRROR);
-    mirror = MIRROR;
-    const uint8_t other = valid_mark(0, SETTINGS_BYTES, 0);
+    sequence = valid_mark(OTHER_COPY, SETTINGS_BYTES);
+    newest = OTHER_COPY;
+    const uint8_t other = valid_mark(0, SETTINGS_BYTES);
     if (other != NOT_VALID && (sequence == NOT_VALID || other == next_sequence())) {
         sequence = other;
-        mirror = 0;
+        newest = 0;
     }
     for (uint8_t i = 0; i < SETTINGS_BYTES; i++) {
         ((uint8_t *)&settings)[i] = store_setting(i);
@@ -83,7 +77,8 @@ bool store_load_settings(void)
 
 uint8_t store_setting(uint8_t i)
 {
-    return sequence == NOT_VALID ? flash_u8((const uint8_t *)&settings_factory + i) : read(1u + i, mirror);
+    return sequence == NOT_VALID ? flash_u8((const uint8_t *)&settings_factory + i)
+                                 : eeprom_port_read((uint8_t)(newest + 1 + i));
 }
 
 static void begin(uint8_t job)
@@ -120,14 +115,14 @@ void store_save_queue(const void *entries)
 store_queue_t store_load_queue(void *entries)
 {
     const uint8_t mark = eeprom_port_read(QUEUE_FIRST);
-    if (mark == ERASED && eeprom_port_read(QUEUE_END) == ERASED) {
+    if (mark == ERASED && eeprom_port_read(QUEUE_FIRST + QUEUE_BYTES) == ERASED) {
         return STORE_QUEUE_NONE;
     }
-    if (valid_mark(QUEUE_FIRST, QUEUE_BYTES, 0) == NOT_VALID) {
+    if (valid_mark(QUEUE_FIRST, QUEUE_BYTES) == NOT_VALID) {
         return STORE_QUEUE_BROKEN;
     }
     uint8_t *bytes = entries;
-    for (uint16_t i = QUEUE_FIRST + 1; i < QUEUE_END; i++) {
+    for (uint16_t i = QUEUE_FIRST + 1; i < QUEUE_FIRST + QUEUE_BYTES; i++) {
         *bytes++ = eeprom_port_read(i);
     }
     return STORE_QUEUE_SAVED;
@@ -156,14 +151,6 @@ static void end_job(void)
     tries = 0;
 }
 
-/* From both ends toward the middle, so that the marks of the settings come first: that of the older copy, then the other
- * one. */
-static uint16_t erase_address(uint16_t step)
-{
-    const uint16_t address = step >> 1;
-    return address ^ (step & 1 ? mirror : mirror ^ MIRROR);
-}
-
 /* Brings a cell to its value: true, and the job goes on, if it has it. */
 static bool put(uint16_t address, uint8_t value)
 {
@@ -181,40 +168,39 @@ static bool put(uint16_t address, uint8_t value)
     return false;
 }
 
+/* The older copy of the settings, then the newer one, each from its mark on; of the snapshot too, that comes first. */
 static void erase_on(void)
 {
     if (at == EEPROM_BYTES) {
         sequence = NOT_VALID;
         end_job();
     } else {
-        put(erase_address(at), ERASED);
+        put(at ^ (newest ^ OTHER_COPY), ERASED);
     }
 }
 
 /* A round: at counts the mark (0: it only begins the sum), the bytes, the checksum; then the mark is written. */
 static void save_on(void)
 {
-    uint16_t first = QUEUE_FIRST, mirrored = 0, bytes = QUEUE_BYTES;
-    uint8_t mark = QUEUE_MARK;
+    uint8_t first = QUEUE_FIRST, mark = QUEUE_MARK;
+    uint16_t bytes = QUEUE_BYTES;
     if (jobs & JOB_SETTINGS) {
-        first = 0;
-        mirrored = mirror ^ MIRROR;
-        bytes = SETTINGS_BYTES;
+        first = newest ^ OTHER_COPY;
         mark = next_sequence();
+        bytes = SETTINGS_BYTES;
     }
-    const uint16_t mark_address = first ^ mirrored;
     if (at == 0) {
         sum = crc16_add(STORE_LAYOUT, mark);
         changed = false;
         at++;
     } else if (at <= bytes + CHECKSUM_BYTES) {
-        uint16_t address = (first + at) ^ mirrored;
+        uint16_t address = first + at;
         uint8_t value = (uint8_t)(sum >> 8);
         if (at <= bytes) {
             value = wanted_byte(at - 1);
         }
-        if (eeprom_port_read(address) != value && eeprom_port_read(mark_address) != NOT_VALID) {
-            address = mark_address; /* first of all */
+        if (eeprom_port_read(address) != value && eeprom_port_read(first) != NOT_VALID) {
+            address = first; /* first of all */
             value = NOT_VALID;
         }
         if (put(address, value)) {
@@ -222,10 +208,10 @@ static void save_on(void)
         }
     } else if (changed) {
         at = 0; /* another round */
-    } else if (put(mark_address, mark)) {
+    } else if (put(first, mark)) {
         if (jobs & JOB_SETTINGS) {
             sequence = mark;
-            mirror = mirrored;
+            newest = first;
         }
         end_job();
     }

@@ -2,14 +2,13 @@
  *
  * Nothing waits for the EEPROM: store_poll() writes a byte at a time. A byte that is right already is not written.
  *
- *   address     what                     as
- *   0..         one copy of the settings   mark, settings_t, checksum
- *   64..        the snapshot               mark, 30 entries of 18 bytes, end mark, checksum
- *   ..1023      the other copy             as the first one, from the last address downward
+ *   address   what                       as
+ *   0, 64     two copies of the settings   mark, settings_t, checksum
+ *   192       the snapshot                 mark, 30 entries of 18 bytes, end mark, checksum
  *
- * A mark of 0 or 0xFF says that its record is not valid; it becomes 0 before anything else of the record is written, and
- * is written last. So whatever a loss of power leaves in the one byte being written, a record is either whole or known
- * not to be. The mark of the settings is their sequence number: the copy that was written last counts, the other one is
+ * A mark of 0, 0x80 or more says that its record is not valid; it becomes 0 before anything else of the record is
+ * written, and is written last. So whatever a loss of power leaves in the one byte being written, a record is either whole or known
+ * not to be. The mark of the settings has their sequence number: the copy that was written last counts, the other one is
  * overwritten. The checksum begins with STORE_LAYOUT: a record of another layout is not valid.
  * A save ends when a round over all its bytes found nothing to be written: what changed meanwhile is in it, entries are
  * whole, and all bytes have been read back.

@@ -178,7 +178,7 @@ static void test_a_blank_or_damaged_eeprom_brings_factory_settings(void)
     memcpy(cells, board_eeprom(board), sizeof cells);
     boot_with(cells);
     assert_shown("A autorun\t9\t");
-    cells[BOARD_EEPROM_BYTES - 20] ^= 0x10; /* the newer copy */
+    cells[64 + 20] ^= 0x10; /* the newer copy */
     boot_with(cells);
     assert_shown("A autorun\t8\t");
     cells[20] ^= 0x10; /* the older one */
