@@ -37,6 +37,13 @@ typedef struct
 #define SETTING_PLACE_PAIR_1(member) member[1]
 #define SETTING_PLACE_MAP(member) member
 
+#define SETTING_BYTES_U8 1
+#define SETTING_BYTES_U16 2
+#define SETTING_BYTES_U32 4
+#define SETTING_BYTES_PAIR_0 sizeof(accel_code_t)
+#define SETTING_BYTES_PAIR_1 sizeof(accel_code_t)
+#define SETTING_BYTES_MAP 1 /* of one of the eight */
+
 extern settings_t settings;
 
 /* In flash. */

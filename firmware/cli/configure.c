@@ -15,34 +15,30 @@
 /* -- the table -------------------------------------------------------------------------------------------------------- */
 
 enum {
-#define SETTING_KIND(kind, bytes, range) KIND_##kind,
+#define SETTING_KIND(kind, range) KIND_##kind,
 #include "settings.def"
 #undef SETTING_KIND
-    /* a value's bytes, by the limits between the kinds */
-    BYTES_1_BELOW = KIND_WORD,
-    BYTES_2_BELOW = KIND_CYCLE,
 };
-#define SETTING_KIND(kind, bytes, range)                                                               \
-    _Static_assert((bytes) == (KIND_##kind < BYTES_1_BELOW ? 1 : KIND_##kind < BYTES_2_BELOW ? 2 : 4), \
-                   "kinds stand in the order of their bytes");
-#include "settings.def"
-#undef SETTING_KIND
 
 /* One after the other, each with its NUL. */
 static const char ranges[] FLASH =
-#define SETTING_KIND(kind, bytes, range) range "\0"
+#define SETTING_KIND(kind, range) range "\0"
 #include "settings.def"
 #undef SETTING_KIND
     ;
 
 /* Bytes, one row behind the other. A pointer to a row is to its letter; these follow. */
-enum { ROW_OFFSET = 1, ROW_KIND, ROW_NAME };
+enum { ROW_PLACE = 1, ROW_KIND, ROW_NAME };
+
+/* A place: offset in settings_t, and the bytes of a value less one in the highest bits. */
+enum { PLACE_OFFSET = 0x3F, PLACE_BYTES_BIT = 6 };
+_Static_assert(sizeof(settings_t) <= PLACE_OFFSET + 1, "offsets fit in");
 
 static const struct {
 #define SETTING(letter, type, member, kind, factory, name) \
     struct {                                               \
         char its_letter;                                   \
-        uint8_t offset, its_kind; /* in settings_t */      \
+        uint8_t place, its_kind;                           \
         char its_name[sizeof name];                        \
     } type##_##member;
 #include "settings.def"
@@ -50,7 +46,8 @@ static const struct {
     char end;
 } rows FLASH = {
 #define SETTING(letter, type, member, kind, factory, name) \
-    {letter, offsetof(settings_t, SETTING_PLACE_##type(member)), KIND_##kind, name},
+    {letter, offsetof(settings_t, SETTING_PLACE_##type(member)) | (SETTING_BYTES_##type - 1) << PLACE_BYTES_BIT, \
+     KIND_##kind, name},
 #include "settings.def"
 #undef SETTING
     '\0',
@@ -80,11 +77,6 @@ static NOINLINE const char *find(uint8_t letter)
     }
 }
 
-static uint8_t bytes_of(uint8_t kind)
-{
-    return kind < BYTES_1_BELOW ? 1 : kind < BYTES_2_BELOW ? 2 : 4;
-}
-
 /* -- values that are typed -------------------------------------------------------------------------------------------- */
 
 static bool configuring;
@@ -103,7 +95,7 @@ static NOINLINE status_t set(const char *text)
         return STATUS_UNKNOWN_COMMAND;
     }
     const uint8_t kind = flash_u8(row + ROW_KIND);
-    uint8_t offset = flash_u8(row + ROW_OFFSET);
+    uint8_t place = flash_u8(row + ROW_PLACE);
     const char *range = ranges;
     for (uint8_t i = kind; i > 0; i--) {
         range = next_text(range);
@@ -114,34 +106,36 @@ static NOINLINE status_t set(const char *text)
         if (entry > 7) {
             return STATUS_RANGE;
         }
-        offset = (uint8_t)(offset + entry);
+        place = (uint8_t)(place + entry);
     }
 
     /* The number: of a ramp value, the places behind its point are counted. */
     uint32_t value = 0;
     uint8_t places = NO_POINT;
-    uint8_t c = (uint8_t)*++text;
-    if (is_end((char)c)) {
+    uint8_t c;
+    while (!is_end((char)(c = (uint8_t)*++text))) {
+        c = (uint8_t)(c - '0');
+        if (c < 10 && places != 2) {
+            if (!number_add_digit(&value, c)) {
+                return STATUS_NUMBER_TOO_LARGE;
+            }
+            places++;
+        } else if (c == (uint8_t)('.' - '0') && kind == KIND_RAMP && places >= NO_POINT) {
+            places = 0;
+        } else {
+            return STATUS_SYNTAX;
+        }
+    }
+    if (places == NO_POINT) {
         return STATUS_NUMBER_MISSING;
     }
-    do {
-        if (c == '.' && kind == KIND_RAMP && places >= NO_POINT) {
-            places = 0;
-        } else if (c < '0' || c > '9' || places == 2) {
-            return STATUS_SYNTAX;
-        } else if (!number_add_digit(&value, (uint8_t)(c - '0'))) {
-            return STATUS_NUMBER_TOO_LARGE;
-        } else {
-            places++;
-        }
-        c = (uint8_t)*++text;
-    } while (!is_end((char)c));
 
     /* The limits stand in the text: of a ramp value, 1 hundredth and 999 wholes. */
     uint32_t least = 0, most = 0;
     while ((c = flash_u8(range++)) != '\0') {
-        if (c >= '0' && c <= '9') {
-            number_add_digit(&most, (uint8_t)(c - '0'));
+        c = (uint8_t)(c - '0');
+        if (c < 10) {
+            number_add_digit(&most, c);
         } else if (most != 0) {
             least = most;
             most = 0;
@@ -149,9 +143,7 @@ static NOINLINE status_t set(const char *text)
     }
     uint16_t to_code = 0;
     if (kind == KIND_RAMP) {
-        if (places >= NO_POINT && value >= 100) {
-            to_code = ACCEL_CODE_WHOLE - 100;
-        } else {
+        if (places < NO_POINT || value < 100) {
             if (places >= NO_POINT) {
                 places = 0;
             }
@@ -159,16 +151,22 @@ static NOINLINE status_t set(const char *text)
                 number_add_digit(&value, 0); /* if there is no room for it it is out of range anyway */
             }
             most = ACCEL_CODE_WHOLE - 1;
+        } else {
+            to_code = ACCEL_CODE_WHOLE - 100;
         }
     } else if (kind == KIND_OPS && value != 0) {
         least = most;
-    } else if (kind <= KIND_AUTORUN && value > most) {
+    }
+    if (value > most) {
+        if (kind > KIND_AUTORUN) {
+            return STATUS_RANGE;
+        }
         value = most;
     }
-    if (value < least || value > most) {
+    if (value < least) {
         return STATUS_RANGE;
     }
-    return store_change(offset, bytes_of(kind), value + to_code);
+    return store_change(place & PLACE_OFFSET, (uint8_t)((place >> PLACE_BYTES_BIT) + 1), value + to_code);
 }
 
 /* -- commands --------------------------------------------------------------------------------------------------------- */
@@ -227,13 +225,18 @@ bool configure_has_cell(bool screen)
     return cell < (screen ? SCREEN_CELLS : commands_debugging() ? LETTERS + EEPROM_BYTES : LETTERS);
 }
 
-static void put_value(const char *row)
+static void put_value(const char *row, bool screen)
 {
-    uint8_t offset = flash_u8(row + ROW_OFFSET);
+    const uint8_t place = flash_u8(row + ROW_PLACE);
     const uint8_t kind = flash_u8(row + ROW_KIND);
+    uint8_t offset = place & PLACE_OFFSET;
     uint32_t value = 0;
-    for (uint8_t i = 0; i < bytes_of(kind); i++) {
-        ((uint8_t *)&value)[i] = store_setting(offset++);
+    uint8_t *byte = (uint8_t *)&value;
+    for (uint8_t left = (uint8_t)((place >> PLACE_BYTES_BIT) + 1); left > 0; left--) {
+        *byte++ = store_setting(offset++);
+    }
+    if (screen && flash_u8(row) == 'D' && value == 0) {
+        return;
     }
     if (kind == KIND_DIRECTION) {
         text_put_flash(FLASH_TEXT("CCW") + (value == 0));
@@ -292,7 +295,7 @@ void configure_put_cell(bool screen)
 {
     const uint16_t at = cell++;
     uint8_t letter = (uint8_t)(at + 'A');
-    bool line_ends = true;
+    bool line_ends = !screen;
     if (screen) {
         letter = (uint8_t)((at >> 1) + 'A');
         line_ends = at & 1;
@@ -304,6 +307,9 @@ void configure_put_cell(bool screen)
         return;
     }
     const char *row = find(letter);
+    if (row == 0 && !screen) {
+        return;
+    }
     if (row != 0) {
         if (screen && line_ends) {
             terminal_port_put('\t');
@@ -314,11 +320,7 @@ void configure_put_cell(bool screen)
         } else {
             terminal_port_put(' ');
         }
-        if (!screen || letter != 'D' || store_setting(flash_u8(row + ROW_OFFSET)) != 0) {
-            put_value(row);
-        }
-    } else if (!screen) {
-        return;
+        put_value(row, screen);
     }
     if (line_ends) {
         text_new_line();
