@@ -30,8 +30,8 @@ static const char ranges[] FLASH =
 /* Bytes, one row behind the other. A pointer to a row is to its letter; these follow. */
 enum { ROW_PLACE = 1, ROW_KIND, ROW_NAME };
 
-/* A place: offset in settings_t, and the bytes of a value less one in the highest bits. */
-enum { PLACE_OFFSET = 0x3F, PLACE_BYTES_BIT = 6 };
+/* A place: offset in settings_t, and how many bytes follow it in the highest bits. */
+enum { PLACE_OFFSET = 0x3F, PLACE_MORE_BIT = 6 };
 _Static_assert(sizeof(settings_t) <= PLACE_OFFSET + 1, "offsets fit in");
 
 static const struct {
@@ -46,7 +46,7 @@ static const struct {
     char end;
 } rows FLASH = {
 #define SETTING(letter, type, member, kind, factory, name) \
-    {letter, offsetof(settings_t, SETTING_PLACE_##type(member)) | (SETTING_BYTES_##type - 1) << PLACE_BYTES_BIT, \
+    {letter, offsetof(settings_t, SETTING_PLACE_##type(member)) | (SETTING_BYTES_##type - 1) << PLACE_MORE_BIT, \
      KIND_##kind, name},
 #include "settings.def"
 #undef SETTING
@@ -131,13 +131,14 @@ static NOINLINE status_t set(const char *text)
     }
 
     /* The limits stand in the text: of a ramp value, 1 hundredth and 999 wholes. */
-    uint32_t least = 0, most = 0;
+    uint16_t least = 0;
+    uint32_t most = 0;
     while ((c = flash_u8(range++)) != '\0') {
         c = (uint8_t)(c - '0');
         if (c < 10) {
             number_add_digit(&most, c);
-        } else if (most != 0) {
-            least = most;
+        } else if ((uint16_t)most != 0) {
+            least = (uint16_t)most;
             most = 0;
         }
     }
@@ -155,7 +156,7 @@ static NOINLINE status_t set(const char *text)
             to_code = ACCEL_CODE_WHOLE - 100;
         }
     } else if (kind == KIND_OPS && value != 0) {
-        least = most;
+        least = (uint16_t)most;
     }
     if (value > most) {
         if (kind > KIND_AUTORUN) {
@@ -166,7 +167,7 @@ static NOINLINE status_t set(const char *text)
     if (value < least) {
         return STATUS_RANGE;
     }
-    return store_change(place & PLACE_OFFSET, (uint8_t)((place >> PLACE_BYTES_BIT) + 1), value + to_code);
+    return store_change(place & PLACE_OFFSET, place >> PLACE_MORE_BIT, value + to_code);
 }
 
 /* -- commands --------------------------------------------------------------------------------------------------------- */
@@ -211,46 +212,51 @@ status_t configure_line(const char *line)
 
 /* -- screen and list -------------------------------------------------------------------------------------------------- */
 
-enum { SCREEN_CELLS = 28, LETTERS = 64 };
+/* Of the screen, or of the list: by letter, then the bytes of the EEPROM. */
+enum { SCREEN_END = 28, LIST_BEGIN = 'A', LIST_END = 0x80, BYTES_END = LIST_END + EEPROM_BYTES };
+static uint16_t cell; /* the next one */
 
-static uint16_t cell; /* the next one; of the list: first the letters, then the bytes of the EEPROM */
-
-void configure_first_cell(void)
+void configure_first_cell(bool screen)
 {
-    cell = 0;
+    cell = screen ? 0 : LIST_BEGIN;
 }
 
-bool configure_has_cell(bool screen)
+bool configure_has_cell(void)
 {
-    return cell < (screen ? SCREEN_CELLS : commands_debugging() ? LETTERS + EEPROM_BYTES : LETTERS);
+    return cell != SCREEN_END && cell != BYTES_END && (cell != LIST_END || commands_debugging());
 }
 
-static void put_value(const char *row, bool screen)
+static void put_value(const char *row)
 {
     const uint8_t place = flash_u8(row + ROW_PLACE);
     const uint8_t kind = flash_u8(row + ROW_KIND);
     uint8_t offset = place & PLACE_OFFSET;
+    uint8_t more = place >> PLACE_MORE_BIT;
     uint32_t value = 0;
     uint8_t *byte = (uint8_t *)&value;
-    for (uint8_t left = (uint8_t)((place >> PLACE_BYTES_BIT) + 1); left > 0; left--) {
+    do {
         *byte++ = store_setting(offset++);
-    }
-    if (screen && flash_u8(row) == 'D' && value == 0) {
-        return;
-    }
+    } while (more-- > 0);
+    uint8_t lowest = (uint8_t)value;
     if (kind == KIND_DIRECTION) {
-        text_put_flash(FLASH_TEXT("CCW") + (value == 0));
+        const char *text = FLASH_TEXT("CCW");
+        if (lowest == 0) {
+            text++;
+        }
+        text_put_flash(text);
+    } else if (kind == KIND_MAP) {
+        for (uint8_t left = 7;; left--) {
+            terminal_port_put((uint8_t)('0' + lowest));
+            if (left == 0) {
+                break;
+            }
+            lowest = store_setting(offset++);
+        }
     } else if (kind == KIND_RAMP) {
         display_put_accel((accel_code_t)value);
     } else {
-        if (kind == KIND_OPS && value != 0) {
+        if (kind == KIND_OPS && lowest != 0) {
             value = 100100; /* in binary; there is no other */
-        }
-        if (kind == KIND_MAP) {
-            for (uint8_t i = 1; i < 8; i++) {
-                terminal_port_put((uint8_t)('0' + value));
-                value = store_setting(offset++);
-            }
         }
         text_put_u32(value);
     }
@@ -291,27 +297,26 @@ static void put_name(const char *name)
 }
 
 /* A letter without a parameter has an empty cell. */
-void configure_put_cell(bool screen)
+void configure_put_cell(void)
 {
     const uint16_t at = cell++;
-    uint8_t letter = (uint8_t)(at + 'A');
-    bool line_ends = !screen;
+    if (at >= LIST_END) {
+        put_byte(at - LIST_END);
+        return;
+    }
+    const bool screen = at < SCREEN_END;
+    uint8_t letter = (uint8_t)at;
+    bool right = false; /* the end of a line */
     if (screen) {
-        letter = (uint8_t)((at >> 1) + 'A');
-        line_ends = at & 1;
-        if (line_ends) {
+        right = letter & 1;
+        letter = (uint8_t)((letter >> 1) + 'A');
+        if (right) {
             letter |= 0x20;
         }
-    } else if (at >= LETTERS) {
-        put_byte(at - LETTERS);
-        return;
     }
     const char *row = find(letter);
-    if (row == 0 && !screen) {
-        return;
-    }
     if (row != 0) {
-        if (screen && line_ends) {
+        if (right) {
             terminal_port_put('\t');
         }
         terminal_port_put(letter);
@@ -319,10 +324,13 @@ void configure_put_cell(bool screen)
             put_name(row + ROW_NAME);
         } else {
             terminal_port_put(' ');
+            right = true;
         }
-        put_value(row, screen);
+        if (!screen || letter != 'D' || store_setting(flash_u8(row + ROW_PLACE)) != 0) {
+            put_value(row);
+        }
     }
-    if (line_ends) {
+    if (right) {
         text_new_line();
     }
 }

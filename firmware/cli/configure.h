@@ -24,8 +24,8 @@ bool configure_mode(void); /* every line is an entry of the screen */
 status_t configure_line(const char *line);
 
 /* The cells of the screen, or of the list of $E, one after the other: at most TEXT_PIECE_BYTES each. */
-void configure_first_cell(void);
-bool configure_has_cell(bool screen);
-void configure_put_cell(bool screen);
+void configure_first_cell(bool screen);
+bool configure_has_cell(void);
+void configure_put_cell(void);
 
 #endif

@@ -159,7 +159,7 @@ static void print_field(uint8_t field, const motion_command_t *command)
             number = 0u - number;
         }
         break;
-    case FIELD_SETTING_CELL: configure_put_cell(current == DISPLAY_CONFIGURE); return;
+    case FIELD_SETTING_CELL: configure_put_cell(); return;
     case FIELD_STATE: text_put_flash(state_words[engine_state()]); return;
     default: number = engine_faults(); break;
     }
@@ -171,7 +171,7 @@ static void begin(uint8_t display)
     current = display;
     text = flash_pointer(&texts[display]);
     row = commands_debugging() ? UINT8_MAX : 0; /* position 0 is shown in debug mode only */
-    configure_first_cell();
+    configure_first_cell(display == DISPLAY_CONFIGURE);
     shown_session = session;
     if (engine_gap()) {
         shown_session.flags |= SHOWN_GAP;
@@ -191,7 +191,7 @@ static void next_text(void)
         } else if (row == QUEUE_LAST + 2 && commands_debugging()) {
             text = queue_executing_text;
         }
-    } else if (current >= DISPLAY_CONFIGURE && configure_has_cell(current == DISPLAY_CONFIGURE)) {
+    } else if (current >= DISPLAY_CONFIGURE && configure_has_cell()) {
         text = cell_text;
     }
     if (text == 0 && waiting_count > 0) {

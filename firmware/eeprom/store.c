@@ -32,7 +32,7 @@ static uint16_t sum;  /* until there */
 static bool changed;  /* something was not right in this round */
 static uint8_t tries; /* to write this byte */
 
-static uint8_t change_offset, change_bytes;
+static uint8_t change_offset, change_more;
 static uint32_t change_value;
 static const uint8_t *queue;
 
@@ -88,13 +88,13 @@ static void begin(uint8_t job)
     tries = 0;
 }
 
-status_t store_change(uint8_t offset, uint8_t bytes, uint32_t value)
+status_t store_change(uint8_t offset, uint8_t more, uint32_t value)
 {
     if (jobs & (JOB_ERASE | JOB_SETTINGS)) {
         return STATUS_WAIT;
     }
     change_offset = offset;
-    change_bytes = bytes;
+    change_more = more;
     change_value = value;
     begin(JOB_SETTINGS); /* a save of the queue begins anew afterwards: what it has written is not written twice */
     return STATUS_OK;
@@ -128,9 +128,9 @@ store_queue_t store_load_queue(void *entries)
     return STORE_QUEUE_SAVED;
 }
 
-bool store_busy(void)
+uint8_t store_busy(void)
 {
-    return jobs != 0;
+    return jobs;
 }
 
 /* Byte i of the record that the present job writes. */
@@ -140,7 +140,7 @@ static uint8_t wanted_byte(uint16_t i)
         return i < STORE_QUEUE_BYTES ? queue[i] : QUEUE_MARK;
     }
     const uint8_t into_change = (uint8_t)(i - change_offset);
-    return into_change < change_bytes ? ((const uint8_t *)&change_value)[into_change] : store_setting((uint8_t)i);
+    return into_change <= change_more ? ((const uint8_t *)&change_value)[into_change] : store_setting((uint8_t)i);
 }
 
 /* The present job is over. */

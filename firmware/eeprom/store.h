@@ -35,9 +35,9 @@ bool store_load_settings(void);
 /* Byte i of the settings as they are stored, valid from the next reset on: not while store_busy(). */
 uint8_t store_setting(uint8_t i);
 
-/* Stores bytes (1..4) of value, the lowest first, at that offset in settings_t. STATUS_WAIT: not taken, a change is
- * being written. */
-status_t store_change(uint8_t offset, uint8_t bytes, uint32_t value);
+/* Stores value at that offset in settings_t, the lowest byte first and so many more (0..3). STATUS_WAIT: not taken, a
+ * change is being written. */
+status_t store_change(uint8_t offset, uint8_t more, uint32_t value);
 
 /* Erases everything: factory settings, no snapshot. What is being written is dropped. */
 void store_restore_factory(void);
@@ -54,7 +54,7 @@ typedef enum {
 /* Fills entries if the snapshot is whole. Takes about 4 ms. Not while store_busy(). */
 store_queue_t store_load_queue(void *entries);
 
-bool store_busy(void); /* something is being written */
+uint8_t store_busy(void); /* not 0: something is being written */
 
 bool store_poll(void); /* writes on; true while store_busy(): call again without sleeping */
 

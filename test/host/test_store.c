@@ -35,7 +35,7 @@ static void finish(void)
 
 static void change(uint8_t offset, uint8_t bytes, uint32_t value)
 {
-    TEST_ASSERT_EQUAL(STATUS_OK, store_change(offset, bytes, value));
+    TEST_ASSERT_EQUAL(STATUS_OK, store_change(offset, bytes - 1, value));
     finish();
 }
 
@@ -94,8 +94,8 @@ static void test_a_change_is_read_back_at_once_and_effective_at_the_next_load(vo
 
 static void test_a_second_change_is_not_taken_while_the_first_one_is_written(void)
 {
-    TEST_ASSERT_EQUAL(STATUS_OK, store_change(PLACE(ustep), 1, 3));
-    TEST_ASSERT_EQUAL(STATUS_WAIT, store_change(PLACE(pulse_us), 1, 30));
+    TEST_ASSERT_EQUAL(STATUS_OK, store_change(PLACE(ustep), 0, 3));
+    TEST_ASSERT_EQUAL(STATUS_WAIT, store_change(PLACE(pulse_us), 0, 30));
     TEST_ASSERT_TRUE(store_busy());
     finish();
     store_load_settings();
@@ -106,7 +106,7 @@ static void test_a_second_change_is_not_taken_while_the_first_one_is_written(voi
 static void test_a_poll_never_waits_for_the_eeprom(void)
 {
     eeprom_fake.slow = 1000;
-    store_change(PLACE(ustep), 1, 3);
+    store_change(PLACE(ustep), 0, 3);
     unsigned polls = 0;
     while (eeprom_fake.written == 0) {
         store_poll();
@@ -158,7 +158,7 @@ static void test_a_power_cut_at_any_write_of_a_change_leaves_the_old_or_the_new_
                 store_load_settings();
                 eeprom_fake.cut_after = (long)(before.written + cut);
                 eeprom_fake.torn = (uint8_t)torn;
-                store_change(PLACE(cycle_us), 4, new.cycle_us);
+                store_change(PLACE(cycle_us), 3, new.cycle_us);
                 while (!eeprom_fake.off) {
                     TEST_ASSERT_TRUE(store_poll());
                 }
@@ -295,11 +295,11 @@ static void test_a_restore_leaves_the_same_image_whatever_was_there(void)
 {
     change(PLACE(network), 1, 1);
     save_queue(0x33);
-    store_change(PLACE(ustep), 1, 5); /* dropped */
+    store_change(PLACE(ustep), 0, 5); /* dropped */
     store_save_queue(entries);
     store_poll();
     store_restore_factory();
-    TEST_ASSERT_EQUAL(STATUS_WAIT, store_change(PLACE(ustep), 1, 5));
+    TEST_ASSERT_EQUAL(STATUS_WAIT, store_change(PLACE(ustep), 0, 5));
     finish();
     TEST_ASSERT_EQUAL_UINT8(0, store_setting(PLACE(network)));
     TEST_ASSERT_EACH_EQUAL_HEX8(0xFF, eeprom_fake.cells, EEPROM_BYTES);
@@ -484,9 +484,9 @@ static void test_a_change_comes_before_the_rest_of_a_snapshot(void)
     }
     const unsigned before = eeprom_fake.written;
     TEST_ASSERT_GREATER_THAN_UINT(100, before);
-    TEST_ASSERT_EQUAL(STATUS_OK, store_change(PLACE(ustep), 1, 3));
-    TEST_ASSERT_EQUAL(STATUS_WAIT, store_change(PLACE(ustep), 1, 4));
-    while (store_change(PLACE(pulse_us), 1, 4) == STATUS_WAIT) {
+    TEST_ASSERT_EQUAL(STATUS_OK, store_change(PLACE(ustep), 0, 3));
+    TEST_ASSERT_EQUAL(STATUS_WAIT, store_change(PLACE(ustep), 0, 4));
+    while (store_change(PLACE(pulse_us), 0, 4) == STATUS_WAIT) {
         store_poll();
     }
     TEST_ASSERT_LESS_OR_EQUAL_UINT(before + RECORD + 1, eeprom_fake.written);
