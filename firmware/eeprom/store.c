@@ -36,14 +36,19 @@ static uint8_t change_offset, change_more;
 static uint32_t change_value;
 static const uint8_t *queue;
 
+static uint16_t first_sum(uint8_t mark)
+{
+    return (uint16_t)(mark << 8 | STORE_LAYOUT);
+}
+
 /* The mark of the record at that address, or NOT_VALID. */
 static NOINLINE uint8_t valid_mark(uint8_t first, uint16_t bytes)
 {
     const uint8_t mark = eeprom_port_read(first);
-    uint16_t crc = STORE_LAYOUT;
+    uint16_t crc = first_sum(mark);
     uint16_t address = first;
-    for (uint16_t left = bytes + (1 + CHECKSUM_BYTES); left > 0; left--) {
-        crc = crc16_add(crc, eeprom_port_read(address++));
+    for (uint16_t left = bytes + CHECKSUM_BYTES; left > 0; left--) {
+        crc = crc16_add(crc, eeprom_port_read(++address));
     }
     return crc == 0 && mark < 0x80 ? mark : NOT_VALID;
 }
@@ -56,7 +61,7 @@ static uint8_t next_sequence(void)
 #ifdef __AVR__
 __attribute__((noinline, noclone, used, externally_visible)) /* the tests' board writes settings when it has returned */
 #endif
-bool store_load_settings(void)
+uint8_t store_load_settings(void)
 {
     jobs = 0;
     while (eeprom_port_busy()) {
@@ -72,7 +77,7 @@ bool store_load_settings(void)
     for (uint8_t i = 0; i < SETTINGS_BYTES; i++) {
         ((uint8_t *)&settings)[i] = store_setting(i);
     }
-    return sequence != NOT_VALID;
+    return sequence;
 }
 
 uint8_t store_setting(uint8_t i)
@@ -190,7 +195,7 @@ static void save_on(void)
         bytes = SETTINGS_BYTES;
     }
     if (at == 0) {
-        sum = crc16_add(STORE_LAYOUT, mark);
+        sum = first_sum(mark);
         changed = false;
         at++;
     } else if (at <= bytes + CHECKSUM_BYTES) {

@@ -9,7 +9,7 @@
  * A mark of 0, 0x80 or more says that its record is not valid; it becomes 0 before anything else of the record is
  * written, and is written last. So whatever a loss of power leaves in the one byte being written, a record is either whole or known
  * not to be. The mark of the settings has their sequence number: the copy that was written last counts, the other one is
- * overwritten. The checksum begins with STORE_LAYOUT: a record of another layout is not valid.
+ * overwritten. The checksum begins with mark and STORE_LAYOUT: a record of another layout is not valid.
  * A save ends when a round over all its bytes found nothing to be written: what changed meanwhile is in it, entries are
  * whole, and all bytes have been read back.
  * Context: main loop.
@@ -24,13 +24,13 @@
 #include <stdint.h>
 #include "base/status.h"
 
-#define STORE_LAYOUT 1u /* counted up when a record changes */
+#define STORE_LAYOUT 1 /* counted up when a record changes */
 #define STORE_QUEUE_BYTES (30u * 18u)
 #define STORE_TRIES 4u
 
-/* At boot and at a warm reset: the settings become what is stored, or the factory's (false: no valid copy). Drops what
+/* At boot and at a warm reset: the settings become what is stored, or the factory's (0: no valid copy). Drops what
  * is being written; nothing else of this module may be called before. */
-bool store_load_settings(void);
+uint8_t store_load_settings(void);
 
 /* Byte i of the settings as they are stored, valid from the next reset on: not while store_busy(). */
 uint8_t store_setting(uint8_t i);
