@@ -54,7 +54,7 @@ static const struct {
 };
 
 /* Behind the NUL. */
-static const char *next_text(const char *text)
+static NOINLINE const char *next_text(const char *text)
 {
     while (flash_u8(text++) != '\0') {
     }
@@ -262,7 +262,7 @@ static void put_value(const char *row)
     }
 }
 
-static void put_hex_digit(uint8_t digit)
+static NOINLINE void put_hex_digit(uint8_t digit)
 {
     terminal_port_put((uint8_t)(digit + (digit < 10 ? '0' : 'A' - 10)));
 }

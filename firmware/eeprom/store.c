@@ -139,7 +139,7 @@ uint8_t store_busy(void)
 }
 
 /* Byte i of the record that the present job writes. */
-static uint8_t wanted_byte(uint16_t i)
+static NOINLINE uint8_t wanted_byte(uint16_t i)
 {
     if (!(jobs & JOB_SETTINGS)) {
         return i < STORE_QUEUE_BYTES ? queue[i] : QUEUE_MARK;
