@@ -4,6 +4,7 @@
 #include "cli/commands.h"
 #include "cli/terminal.h"
 #include "cli/terminal_port.h"
+#include "eeprom/store.h"
 #include "motion/engine.h"
 #include "pins_port.h"
 #include "queue/queue.h"
@@ -11,6 +12,7 @@
 
 int main(void)
 {
+    store_load_settings();
     pins_init();
     engine_init();
     commands_init();
@@ -25,6 +27,7 @@ int main(void)
         bool worked = terminal_poll(); /* first: a line's end is what wakes a unit at rest, and its motion is awaited */
         worked |= queue_poll();
         worked |= engine_poll();
+        worked |= store_poll();
         if (!worked) {
             wake_sleep();
         }

@@ -1,64 +1,16 @@
 #include "settings.h"
 
-/* Factory values (requirements, annex A; ihd, xclk and what later parts need follow with those parts). */
-#ifndef SETTINGS_CYCLE_US
-#define SETTINGS_CYCLE_US 3000
-#endif
-#ifndef SETTINGS_HW_BAUD
-#define SETTINGS_HW_BAUD 38400
-#endif
-#ifndef SETTINGS_STEPS_PER_REV
-#define SETTINGS_STEPS_PER_REV 200
-#endif
-#ifndef SETTINGS_ACCEL /* accel codes: hundredths up to 9999 */
-#define SETTINGS_ACCEL 100
-#endif
-#ifndef SETTINGS_DECEL
-#define SETTINGS_DECEL 100
-#endif
-#ifndef SETTINGS_LINEAR_ACCEL
-#define SETTINGS_LINEAR_ACCEL 1047
-#endif
-#ifndef SETTINGS_LINEAR_DECEL
-#define SETTINGS_LINEAR_DECEL 1047
-#endif
-#ifndef SETTINGS_RAMP
-#define SETTINGS_RAMP 0
-#endif
-#ifndef SETTINGS_CW_LEVEL
-#define SETTINGS_CW_LEVEL 0
-#endif
-#ifndef SETTINGS_DIRECTION
-#define SETTINGS_DIRECTION 0
-#endif
-#ifndef SETTINGS_USTEP
-#define SETTINGS_USTEP 0
-#endif
-#ifndef SETTINGS_PULSE_US
-#define SETTINGS_PULSE_US 2
-#endif
-#ifndef SETTINGS_SLOW_RPM
-#define SETTINGS_SLOW_RPM 10
-#endif
-#ifndef SETTINGS_FULL_STEP
-#define SETTINGS_FULL_STEP 1
+#define SETTING(letter, type, member, kind, factory, name) .SETTING_PLACE_##type(member) = factory,
+
+#ifdef __AVR__
+/* Filled at boot (eeprom/store.c). Not to be taken for constants: on the board the tests write them from outside. */
+__attribute__((used, externally_visible)) settings_t settings;
+#else
+settings_t settings = {
+#include "settings.def"
+};
 #endif
 
-/* Not to be taken for constants: they are written from outside (by the tests' board, and from EEPROM in time). */
-#ifdef __AVR__
-__attribute__((used, externally_visible))
-#endif
-settings_t settings = {
-    .cycle_us = SETTINGS_CYCLE_US,
-    .hw_baud = SETTINGS_HW_BAUD,
-    .steps_per_rev = SETTINGS_STEPS_PER_REV,
-    .accel = {SETTINGS_ACCEL, SETTINGS_LINEAR_ACCEL},
-    .decel = {SETTINGS_DECEL, SETTINGS_LINEAR_DECEL},
-    .ramp = SETTINGS_RAMP,
-    .cw_level = SETTINGS_CW_LEVEL,
-    .direction = SETTINGS_DIRECTION,
-    .ustep = SETTINGS_USTEP,
-    .pulse_us = SETTINGS_PULSE_US,
-    .slow_rpm = SETTINGS_SLOW_RPM,
-    .full_step = SETTINGS_FULL_STEP,
+const settings_t settings_factory FLASH = {
+#include "settings.def"
 };

@@ -1,31 +1,57 @@
-/* The parameters that the firmware runs with.
+/* The parameters that the firmware runs with: one member for each row of settings.def, in its order, without padding.
  *
  * Units:   in the names.
- * Context: written before motion starts (boot); read by the main loop everywhere. Interrupts never read them.
- * Until they are kept in EEPROM they hold the factory values below; each can be set at build time (make firmware
- * DEFS='-DSETTINGS_USTEP=3'), and the tests on the board write them in RAM when main is reached.
+ * Context: written before motion starts, from EEPROM (eeprom/store.h); read by the main loop everywhere. Interrupts
+ *          never read them. The tests on the board write them in RAM when they have been loaded.
+ * Tests:   test/host/test_settings.c
  * Source:  manual lines 684-835. */
 #ifndef SETTINGS_H
 #define SETTINGS_H
 
 #include <stdint.h>
+#include "base/flash.h"
 #include "motion/command.h"
 
-typedef struct {
-    uint32_t cycle_us;       /* b: default cycle, us per full step; seeds the queue and the session */
-    uint32_t hw_baud;        /* m: bits per second of the hardware port */
-    uint16_t steps_per_rev;  /* a: full steps per revolution, >= 1 */
-    accel_code_t accel[2];   /* d, f: harmonic, linear */
-    accel_code_t decel[2];   /* e, g: harmonic, linear */
-    uint8_t ramp;            /* B: 0 harmonic, 1 linear at start-up */
-    uint8_t cw_level;        /* F: level of dir for clockwise, 0 or 1 */
-    uint8_t direction;       /* G: 0 CW, 1 CCW: direction of a command that gives none */
-    uint8_t ustep;           /* J: microsteps as a power of two, 0..7 */
-    uint8_t pulse_us;        /* K: width of the clk pulse, >= 1 */
-    uint8_t slow_rpm;        /* L: start, stop and reversal speed, >= 1 */
-    uint8_t full_step;       /* u: 1 counts are full steps, 0 pulses */
+#define SETTING_MEMBER_U8(member) uint8_t member;
+#define SETTING_MEMBER_U16(member) uint16_t member;
+#define SETTING_MEMBER_U32(member) uint32_t member;
+#define SETTING_MEMBER_PAIR_0(member) accel_code_t member[2];
+#define SETTING_MEMBER_PAIR_1(member)
+#define SETTING_MEMBER_MAP(member) uint8_t member[8];
+
+typedef struct
+#ifndef __AVR__
+    __attribute__((packed)) /* as on the AVR, where nothing is aligned */
+#endif
+{
+#define SETTING(letter, type, member, kind, factory, name) SETTING_MEMBER_##type(member)
+#include "settings.def"
+#undef SETTING
 } settings_t;
 
+/* How a row's value is called: settings.SETTING_PLACE_<type>(member). */
+#define SETTING_PLACE_U8(member) member
+#define SETTING_PLACE_U16(member) member
+#define SETTING_PLACE_U32(member) member
+#define SETTING_PLACE_PAIR_0(member) member[0]
+#define SETTING_PLACE_PAIR_1(member) member[1]
+#define SETTING_PLACE_MAP(member) member
+
+#define SETTING_BYTES_U8 1
+#define SETTING_BYTES_U16 2
+#define SETTING_BYTES_U32 4
+#define SETTING_BYTES_PAIR_0 sizeof(accel_code_t)
+#define SETTING_BYTES_PAIR_1 sizeof(accel_code_t)
+#define SETTING_BYTES_MAP 1 /* of one of the eight */
+
 extern settings_t settings;
+
+/* In flash. */
+extern const settings_t settings_factory;
+
+static inline void settings_to_factory(void)
+{
+    FLASH_COPY(&settings, &settings_factory, sizeof settings);
+}
 
 #endif

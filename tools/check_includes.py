@@ -31,7 +31,7 @@ def room(path):
     parts = pathlib.PurePosixPath(path).parts
     if len(parts) > 1:
         return parts[0]
-    return {"settings.h": "settings", "settings.c": "settings", "board.h": "board", "version.h": "version"}.get(parts[0], "main")
+    return {"settings.h": "settings", "settings.c": "settings", "settings.def": "settings", "board.h": "board", "version.h": "version"}.get(parts[0], "main")
 
 
 def resolve(root, includer, name):

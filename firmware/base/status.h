@@ -11,6 +11,7 @@ typedef enum {
 #define STATUS(name, number, words, remedy) STATUS_##name = (number),
 #include "base/status.def"
 #undef STATUS
+    STATUS_WAIT = 0xFF, /* never answered: the line waits and is executed again (cli/terminal.c) */
 } status_t;
 
 /* The words of an error, in flash (base/flash.h); an empty text for STATUS_OK. */

@@ -3,6 +3,7 @@
 #include "base/inline.h"
 #include "base/number.h"
 #include "base/zeroed.h"
+#include "cli/configure.h"
 #include "cli/display.h"
 #include "cli/motion_syntax.h"
 #include "cli/timebase_port.h"
@@ -28,7 +29,7 @@ typedef struct {
 static bool debugging;
 
 /* What a line is read as. */
-static enum { MODE_COMMANDS, MODE_QUEUE, MODE_ARRAY } mode;
+static enum { MODE_COMMANDS, MODE_QUEUE, MODE_ARRAY, MODE_CONFIGURE } mode;
 
 /* A range of numbers, and how an error names it. */
 typedef struct {
@@ -242,6 +243,28 @@ static status_t command_edit(const char *rest)
     return status;
 }
 
+static status_t command_configure(const char *rest)
+{
+    if (more(*rest)) {
+        return configure_set(rest);
+    }
+    mode = MODE_CONFIGURE;
+    return display_request(DISPLAY_CONFIGURE);
+}
+
+static status_t command_save(const char *rest)
+{
+    (void)rest;
+    queue_save();
+    return STATUS_OK;
+}
+
+static status_t command_restore(const char *rest)
+{
+    (void)rest;
+    return queue_restore();
+}
+
 static status_t command_undo(const char *rest)
 {
     (void)rest;
@@ -450,20 +473,21 @@ static NOINLINE status_t execute_by_table(const char *line)
     if (!more(line[0])) {
         return STATUS_OK;
     }
-    const bool digit = (uint8_t)(line[0] - '0') <= 9;
     if (mode != MODE_COMMANDS) {
-        if (digit) {
-            return mode == MODE_QUEUE ? command_edit(line) : program_array(line);
-        }
-        if ((line[0] | 0x20) == 'x' && !more(line[1])) {
+        const bool alone = !more(line[1]);
+        const char letter = line[0] | 0x20;
+        if (alone && letter == 'x') {
             mode = MODE_COMMANDS;
             return STATUS_OK;
         }
-        if ((line[0] | 0x20) != 's' && (line[0] | 0x20) != 'q' && line[0] != '?') {
-            return STATUS_SYNTAX; /* nothing that would move the motor */
+        if (mode == MODE_CONFIGURE && (!alone || line[0] != 'S')) {
+            return configure_line(line);
+        }
+        if (!alone || (letter != 's' && letter != 'q' && letter != '?')) { /* nothing that would move the motor */
+            return mode == MODE_QUEUE ? command_edit(line) : program_array(line);
         }
     }
-    if (digit) {
+    if ((uint8_t)(line[0] - '0') <= 9) {
         return STATUS_NOT_YET; /* a network address: TRM-006 */
     }
     if (line[0] == '$') {
@@ -489,6 +513,11 @@ const char *commands_refused_range(void)
     return ahead.range;
 }
 
+void commands_refuse_range(const char *range)
+{
+    ahead.range = range;
+}
+
 bool commands_at_once(char character)
 {
     if (mode != MODE_COMMANDS || (character != '+' && character != '-')) {
@@ -500,7 +529,7 @@ bool commands_at_once(char character)
 
 const char *commands_prompt(void)
 {
-    return mode == MODE_COMMANDS ? FLASH_TEXT("SAC>") : mode == MODE_QUEUE ? FLASH_TEXT("Q>") : FLASH_TEXT("X>");
+    return mode == MODE_QUEUE ? FLASH_TEXT("Q>") : mode == MODE_ARRAY ? FLASH_TEXT("X>") : FLASH_TEXT("SAC>");
 }
 
 bool commands_debugging(void)

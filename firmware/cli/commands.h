@@ -23,6 +23,7 @@ status_t commands_execute(const char *line, uint8_t length);
 
 /* The range that the last STATUS_RANGE referred to, in flash. */
 const char *commands_refused_range(void);
+void commands_refuse_range(const char *range);
 
 /* + and -: whether this character, first on a line, is a command of its own. Executes it if so. */
 bool commands_at_once(char character);

@@ -3,8 +3,10 @@
 #include "base/inline.h"
 #include "base/zeroed.h"
 #include "cli/commands.h"
+#include "cli/configure.h"
 #include "cli/terminal_port.h"
 #include "cli/text.h"
+#include "eeprom/store.h"
 #include "motion/engine.h"
 #include "queue/queue.h"
 #include "queue/session.h"
@@ -43,6 +45,7 @@ _Static_assert(((SHOWN_GAP | SHOWN_DEBUG) & SESSION_FLAGS) == 0, "flags that no 
 #define STATE "\x8C"
 #define FAULTS "\x8D"
 #define ENTRY "\x8E"
+#define SETTING_CELL "\x8F"
 enum {
     FIELD_COUNT = 0x80,
     FIELD_RPM,
@@ -59,6 +62,7 @@ enum {
     FIELD_STATE,
     FIELD_FAULTS,
     FIELD_ENTRY,
+    FIELD_SETTING_CELL,
 };
 
 /* A choice between two texts: the first one if the command has the flag that is in these bits of the character. */
@@ -101,6 +105,8 @@ static const char defaults_text[] FLASH =
 /* clang-format on */
 
 static const char array_text[] FLASH = "x_ " ROW " " ENTRY "\r\n" NEXT_ROW;
+static const char configure_text[] FLASH = "Config:\r\n" NEXT_ROW;
+static const char cell_text[] FLASH = SETTING_CELL NEXT_ROW;
 static const char velocity_text[] FLASH = VELOCITY "\r\n";
 static const char position_text[] FLASH = "position " POSITION " " STATE " faults " FAULTS "\r\n";
 
@@ -108,7 +114,7 @@ static const char position_text[] FLASH = "position " POSITION " " STATE " fault
 static const char *const texts[] FLASH = {
     [DISPLAY_QUEUE] = queue_text,       [DISPLAY_DEFAULTS] = defaults_text, [DISPLAY_VELOCITY] = velocity_text,
     [DISPLAY_POSITION] = position_text, [DISPLAY_HELP] = commands_help,
-    [DISPLAY_ARRAY] = array_text,
+    [DISPLAY_ARRAY] = array_text,       [DISPLAY_CONFIGURE] = configure_text, [DISPLAY_EEPROM] = cell_text,
 };
 
 /* Indexed by motion_state_t. */
@@ -116,7 +122,7 @@ static const char state_words[][8] FLASH = {"STANDBY", "ACCEL", "CRUISE", "DECEL
 
 /* -- printing --------------------------------------------------------------------------------------------------------- */
 
-static void put_accel(accel_code_t code)
+void display_put_accel(accel_code_t code)
 {
     if (code < ACCEL_CODE_WHOLE) {
         text_put_decimal(code, 2);
@@ -133,8 +139,8 @@ static void print_field(uint8_t field, const motion_command_t *command)
     case FIELD_COUNT: number = command->count; break;
     case FIELD_RPM: number = command_rpm(command); break;
     case FIELD_CYCLE: number = command_cycle_us(command); break;
-    case FIELD_ACCEL: put_accel(command->accel); return;
-    case FIELD_DECEL: put_accel(command->decel); return;
+    case FIELD_ACCEL: display_put_accel(command->accel); return;
+    case FIELD_DECEL: display_put_accel(command->decel); return;
     case FIELD_EXTRA: number = command->extra_pulses; break;
     case FIELD_WAIT: number = command->start_wait_us; break;
     case FIELD_ROW: number = shown.row; break;
@@ -153,6 +159,7 @@ static void print_field(uint8_t field, const motion_command_t *command)
             number = 0u - number;
         }
         break;
+    case FIELD_SETTING_CELL: configure_put_cell(); return;
     case FIELD_STATE: text_put_flash(state_words[engine_state()]); return;
     case FIELD_ENTRY: number = queue_array(shown.row); break;
     default: number = engine_faults(); break;
@@ -170,6 +177,7 @@ static void begin(uint8_t display)
     }
     shown.text = flash_pointer(&texts[display]);
     shown.row = 0;
+    configure_first_cell(display == DISPLAY_CONFIGURE);
     shown.session = session;
     uint8_t flags = session.flags;
     if (engine_gap()) {
@@ -211,6 +219,9 @@ static const char *next_row(const char *behind_it)
     }
     if (shown.current == DISPLAY_ARRAY && before < QUEUE_ARRAY - 1 && queue_array(before) != 0) {
         return array_text;
+    }
+    if (shown.current >= DISPLAY_CONFIGURE && shown.current < DISPLAY_ROW && configure_has_cell()) {
+        return cell_text;
     }
     return array_text + sizeof array_text - 1; /* nothing */
 }
@@ -297,6 +308,8 @@ bool display_poll(void)
     if (shown.text == 0 || terminal_port_free() < TEXT_PIECE_BYTES) {
         return false;
     }
-    print_piece();
+    if (shown.current < DISPLAY_CONFIGURE || !store_busy()) { /* these are read from the EEPROM */
+        print_piece();
+    }
     return true;
 }

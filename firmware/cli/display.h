@@ -13,6 +13,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include "base/status.h"
+#include "motion/command.h"
 
 typedef enum {
     DISPLAY_QUEUE,    /* q */
@@ -21,6 +22,8 @@ typedef enum {
     DISPLAY_POSITION, /* p */
     DISPLAY_HELP,     /* ? */
     DISPLAY_ARRAY,    /* xd */
+    DISPLAY_CONFIGURE, /* $C, cc; from here on: what is stored, when nothing is being written */
+    DISPLAY_EEPROM,    /* $E */
     DISPLAY_ROW = 32, /* and a position: one row of the queue */
     DISPLAYS
 } display_t;
@@ -30,6 +33,7 @@ typedef enum {
 void display_init(void);
 status_t display_request(display_t display);
 bool display_active(void); /* something is being printed or waits */
-bool display_poll(void);   /* prints the next piece; true if it did */
+void display_put_accel(accel_code_t code);
+bool display_poll(void);   /* prints the next piece; true if it did, or waits for what is being stored */
 
 #endif

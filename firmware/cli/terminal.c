@@ -21,6 +21,7 @@ static const char version_line[] FLASH = "SAC " VERSION_NUMBER " " VERSION_DATE 
 static line_t line;
 
 static struct terminal {
+    bool held;      /* the line is whole, and waits for what is being stored */
     uint8_t echoed; /* how many characters of the line stand on the screen */
 
     /* What is owed while answers are held back. */
@@ -153,6 +154,11 @@ static NOINLINE void end_line(void)
     } else {
         commands_read_ahead(line.text, 0);
     }
+    t->held = status == STATUS_WAIT;
+    if (t->held) {
+        t->timing = false;
+        return;
+    }
     if (timed && commands_debugging()) {
         t->loaded_us = timebase_us();
         t->owes_times = 2;
@@ -210,7 +216,7 @@ bool terminal_poll(void)
     uint8_t bytes = BYTES_AT_ONCE; /* still to be taken in this round */
     bool worked = false;
     for (uint8_t lines = PRESSED_LINES; lines > 0; lines--) {
-        const line_event_t event = take(&bytes);
+        const line_event_t event = terminal.held ? LINE_ENDED : take(&bytes);
         if (event == LINE_ERASED) {
             erase();
         }

@@ -29,7 +29,11 @@ enum {
     MOTION_CYCLE = 1 << 4,  /* velocity is a cycle in microseconds per full step, otherwise RPM */
 };
 
-typedef struct {
+typedef struct
+#ifndef __AVR__
+    __attribute__((packed)) /* as on the AVR: 18 bytes */
+#endif
+{
     uint32_t count;         /* full steps, or pulses: 1..2^32-1; 0: until it is ended */
     uint32_t velocity;      /* RPM, or cycle in us with MOTION_CYCLE: 1..2^32-1 */
     uint32_t start_wait_us; /* 0..2^32-1 */

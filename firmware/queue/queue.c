@@ -1,5 +1,6 @@
 #include "queue/queue.h"
 #include "base/inline.h"
+#include "eeprom/store.h"
 #include "motion/engine.h"
 #include "queue/session.h"
 #include "settings.h"
@@ -158,6 +159,32 @@ void queue_clear(void)
         revolution(&entries[position]);
     }
     undo_position = 0;
+}
+
+_Static_assert(STORE_QUEUE_BYTES == QUEUE_LAST * sizeof(motion_command_t), "the snapshot holds the entries");
+
+void queue_save(void)
+{
+    store_save_queue(&entries[QUEUE_FIRST]);
+}
+
+status_t queue_restore(void)
+{
+    if (store_busy()) {
+        return STATUS_WAIT;
+    }
+    const store_queue_t found = store_load_queue(&entries[QUEUE_FIRST]);
+    if (found == STORE_QUEUE_BROKEN) {
+        return STATUS_SNAPSHOT;
+    }
+    if (found == STORE_QUEUE_NONE) {
+        const session_t kept = session;
+        session_init();
+        queue_clear();
+        session = kept;
+    }
+    undo_position = 0;
+    return STATUS_OK;
 }
 
 /* -- what is written --------------------------------------------------------------------------------------------- */

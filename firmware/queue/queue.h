@@ -31,6 +31,11 @@ void queue_init(void);
 /* Seeds the entries 1..30 with the session defaults, one motor revolution each (qc); what is pending stays so. */
 void queue_clear(void);
 
+/* Saves the entries 1..30 in the background (eeprom/store.h), and gets them back: the last snapshot, or system defaults
+ * if none was ever saved. STATUS_WAIT: something is being written; STATUS_SNAPSHOT: it is damaged, nothing is changed. */
+void queue_save(void);
+status_t queue_restore(void);
+
 /* Stores a command that engine_check() passed at the next available position and makes it pending.
  * STATUS_QUEUE_FULL when all 30 are. */
 status_t queue_add(const motion_command_t *command);

@@ -71,8 +71,8 @@ void run_begin(run_t *run, setup_t setup)
     run->board = board_new(bench_elf, NULL);
     if (!run->board)
         exit(2);
-    if (board_run_to_pc(run->board, symbol(run, "main"), TICKS_PER_S) != BOARD_MATCHED)
-        die("the image does not reach main");
+    if (board_run_past(run->board, symbol(run, "store_load_settings"), TICKS_PER_S) != BOARD_MATCHED)
+        die("the image does not load its settings");
     uint16_t at = symbol(run, "settings");
     board_poke8(run->board, (uint16_t)(at + offsetof(settings_t, ustep)), setup.ustep);
     board_poke8(run->board, (uint16_t)(at + offsetof(settings_t, pulse_us)), setup.pulse_us);

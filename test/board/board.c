@@ -216,6 +216,17 @@ board_run_t board_run_to_pc(board_t *b, uint16_t byte_address, uint64_t limit_cy
     return crashed(b) ? BOARD_CRASHED : BOARD_RAN;
 }
 
+board_run_t board_run_past(board_t *b, uint16_t byte_address, uint64_t limit_cycles)
+{
+    board_run_t how = board_run_to_pc(b, byte_address, limit_cycles);
+    if (how != BOARD_MATCHED)
+        return how;
+    enum { SPL = 0x5D, SPH = 0x5E };
+    uint16_t top = (uint16_t)(board_peek8(b, SPL) | board_peek8(b, SPH) << 8);
+    uint16_t words = (uint16_t)(board_peek8(b, (uint16_t)(top + 1)) << 8 | board_peek8(b, (uint16_t)(top + 2)));
+    return board_run_to_pc(b, (uint16_t)(2 * words), limit_cycles);
+}
+
 board_run_t board_run_until(board_t *b, bool (*cond)(board_t *, void *), void *ctx, uint64_t limit_cycles)
 {
     uint64_t limit = b->avr->cycle + limit_cycles;

@@ -42,6 +42,7 @@ typedef enum {
 board_run_t board_run_to(board_t *b, uint64_t cycle);
 board_run_t board_run_for(board_t *b, uint64_t cycles);
 board_run_t board_run_to_pc(board_t *b, uint16_t byte_address, uint64_t limit_cycles); /* before that instruction */
+board_run_t board_run_past(board_t *b, uint16_t byte_address, uint64_t limit_cycles); /* that function has returned */
 /* Until cond(b, ctx) is true, asked after every instruction; keep it cheap. */
 board_run_t board_run_until(board_t *b, bool (*cond)(board_t *, void *), void *ctx, uint64_t limit_cycles);
 const char *board_crash(const board_t *b);

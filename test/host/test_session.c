@@ -8,6 +8,7 @@ static settings_t factory;
 
 void setUp(void)
 {
+    settings_to_factory();
     factory = settings;
     session_init();
 }

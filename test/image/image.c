@@ -228,10 +228,21 @@ static uint16_t address_of(const char *symbol)
     return address;
 }
 
+void image_load_settings(void)
+{
+    if (board_run_past(board, address_of("store_load_settings"), SECOND) != BOARD_MATCHED)
+        image_fail("the settings were not loaded by cycle %" PRIu64, board_cycle(board));
+}
+
 void image_power_on(void)
 {
+    image_power_on_with(NULL);
+}
+
+void image_power_on_with(const uint8_t *eeprom)
+{
     tracing = false;
-    board = board_new(SAC_ELF, NULL);
+    board = board_new(SAC_ELF, eeprom);
     TEST_ASSERT_NOT_NULL_MESSAGE(board, SAC_ELF);
     state_address = address_of("motion_state");
     board_record(board, CLK, true);
@@ -239,8 +250,7 @@ void image_power_on(void)
     board_on_edge(board, on_edge, NULL);
     dir_level = 0;
     image_train_clear();
-    if (board_run_to_pc(board, address_of("main"), SECOND) != BOARD_MATCHED)
-        image_fail("main was not reached by cycle %" PRIu64, board_cycle(board));
+    image_load_settings();
 }
 
 void image_poke_setting(size_t offset, size_t bytes, uint32_t value)

@@ -33,12 +33,14 @@ void image_fail(const char *format, ...) __attribute__((format(printf, 1, 2), __
 
 /* -- power ------------------------------------------------------------------------------------------------------- */
 
-void image_power_on(void); /* stands before main(): settings can be written with IMAGE_SET */
+void image_power_on(void); /* stands where the settings have been loaded: they can be written with IMAGE_SET */
+void image_power_on_with(const uint8_t *eeprom); /* the same, with these contents */
+void image_load_settings(void);                  /* after a reset: on to there */
 void image_prompt(void);   /* on to the first prompt; what was printed and recorded until then is forgotten */
 void image_boot(void);     /* both */
 void image_off(void);
 
-/* One parameter before main() begins; the firmware's struct has no padding on either machine. */
+/* One parameter in RAM before anything has read it; the firmware's struct has no padding on either machine. */
 #define IMAGE_SET(member, value) \
     image_poke_setting(offsetof(settings_t, member), sizeof(((settings_t *)0)->member), (uint32_t)(value))
 void image_poke_setting(size_t offset, size_t bytes, uint32_t value);

@@ -1,0 +1,301 @@
+#include "cli/configure.h"
+#include <stddef.h>
+#include "base/flash.h"
+#include "base/inline.h"
+#include "base/number.h"
+#include "cli/commands.h"
+#include "cli/display.h"
+#include "cli/terminal_port.h"
+#include "cli/text.h"
+#include "eeprom/eeprom_port.h"
+#include "eeprom/store.h"
+#include "settings.h"
+
+/* -- the table -------------------------------------------------------------------------------------------------------- */
+
+enum {
+#define SETTING_KIND(kind, range) KIND_##kind,
+#include "settings.def"
+#undef SETTING_KIND
+};
+
+/* One after the other, each with its NUL. */
+static const char ranges[] FLASH =
+#define SETTING_KIND(kind, range) range "\0"
+#include "settings.def"
+#undef SETTING_KIND
+    ;
+
+/* Bytes, one row behind the other. A pointer to a row is to its letter; these follow. */
+enum { ROW_PLACE = 1, ROW_KIND, ROW_NAME };
+
+/* A place: offset in settings_t, and how many bytes follow it in the highest bits. */
+enum { PLACE_OFFSET = 0x3F, PLACE_MORE_BIT = 6 };
+_Static_assert(sizeof(settings_t) <= PLACE_OFFSET + 1, "offsets fit in");
+
+static const struct {
+#define SETTING(letter, type, member, kind, factory, name) \
+    struct {                                               \
+        char its_letter;                                   \
+        uint8_t place, its_kind;                           \
+        char its_name[sizeof name];                        \
+    } type##_##member;
+#include "settings.def"
+#undef SETTING
+    char end;
+} rows FLASH = {
+#define SETTING(letter, type, member, kind, factory, name) \
+    {letter, offsetof(settings_t, SETTING_PLACE_##type(member)) | (SETTING_BYTES_##type - 1) << PLACE_MORE_BIT, \
+     KIND_##kind, name},
+#include "settings.def"
+#undef SETTING
+    '\0',
+};
+
+/* Behind the NUL. */
+static NOINLINE const char *next_text(const char *text)
+{
+    while (flash_u8(text++) != '\0') {
+    }
+    return text;
+}
+
+/* The letter's row, in flash; 0: there is none. */
+static NOINLINE const char *find(uint8_t letter)
+{
+    const char *row = (const char *)&rows;
+    for (;;) {
+        const uint8_t its_letter = flash_u8(row);
+        if (its_letter == letter) {
+            return row;
+        }
+        if (its_letter == '\0') {
+            return 0;
+        }
+        row = next_text(row + ROW_NAME);
+    }
+}
+
+/* -- values that are typed -------------------------------------------------------------------------------------------- */
+
+static bool is_end(char c)
+{
+    return c == '\0' || c == ' ';
+}
+
+NOINLINE status_t configure_set(const char *text)
+{
+    enum { NO_POINT = 0x80 };
+    const char *row = find((uint8_t)*text);
+    if (row == 0) {
+        return STATUS_UNKNOWN_COMMAND;
+    }
+    const uint8_t kind = flash_u8(row + ROW_KIND);
+    uint8_t place = flash_u8(row + ROW_PLACE);
+    const char *range = ranges;
+    for (uint8_t i = kind; i > 0; i--) {
+        range = next_text(range);
+    }
+    commands_refuse_range(range); /* told with STATUS_RANGE only */
+    if (kind == KIND_MAP) {
+        const uint8_t entry = (uint8_t)(*++text - '0');
+        if (entry > 7) {
+            return STATUS_RANGE;
+        }
+        place = (uint8_t)(place + entry);
+    }
+
+    /* The number: of a ramp value, the places behind its point are counted. */
+    uint32_t value = 0;
+    uint8_t places = NO_POINT;
+    uint8_t c;
+    while (!is_end((char)(c = (uint8_t)*++text))) {
+        c = (uint8_t)(c - '0');
+        if (c < 10 && places != 2) {
+            if (!number_add_digit(&value, c)) {
+                return STATUS_NUMBER_TOO_LARGE;
+            }
+            places++;
+        } else if (c == (uint8_t)('.' - '0') && kind == KIND_RAMP && places >= NO_POINT) {
+            places = 0;
+        } else {
+            return STATUS_SYNTAX;
+        }
+    }
+    if (places == NO_POINT) {
+        return STATUS_NUMBER_MISSING;
+    }
+
+    /* The limits stand in the text: of a ramp value, 1 hundredth and 999 wholes. */
+    uint16_t least = 0;
+    uint32_t most = 0;
+    while ((c = flash_u8(range++)) != '\0') {
+        c = (uint8_t)(c - '0');
+        if (c < 10) {
+            number_add_digit(&most, c);
+        } else if ((uint16_t)most != 0) {
+            least = (uint16_t)most;
+            most = 0;
+        }
+    }
+    uint16_t to_code = 0;
+    if (kind == KIND_RAMP) {
+        if (places < NO_POINT || value < 100) {
+            if (places >= NO_POINT) {
+                places = 0;
+            }
+            for (; places < 2; places++) {
+                number_add_digit(&value, 0); /* if there is no room for it it is out of range anyway */
+            }
+            most = ACCEL_CODE_WHOLE - 1;
+        } else {
+            to_code = ACCEL_CODE_WHOLE - 100;
+        }
+    } else if (kind == KIND_OPS && value != 0) {
+        least = (uint16_t)most;
+    }
+    if (value > most) {
+        if (kind > KIND_AUTORUN) {
+            return STATUS_RANGE;
+        }
+        value = most;
+    }
+    if (value < least) {
+        return STATUS_RANGE;
+    }
+    return store_change(place & PLACE_OFFSET, place >> PLACE_MORE_BIT, value + to_code);
+}
+
+status_t configure_line(const char *line)
+{
+    const status_t status = configure_set(line);
+    if (status == STATUS_OK) {
+        (void)display_request(DISPLAY_CONFIGURE); /* it is stored, even if there is no room for one more display */
+    }
+    return status;
+}
+
+/* -- screen and list -------------------------------------------------------------------------------------------------- */
+
+/* Of the screen, or of the list: by letter, then the bytes of the EEPROM. */
+enum { SCREEN_END = 28, LIST_BEGIN = 'A', LIST_END = 0x80, BYTES_END = LIST_END + EEPROM_BYTES };
+static uint16_t cell; /* the next one */
+
+void configure_first_cell(bool screen)
+{
+    cell = screen ? 0 : LIST_BEGIN;
+}
+
+bool configure_has_cell(void)
+{
+    return cell != SCREEN_END && cell != BYTES_END && (cell != LIST_END || commands_debugging());
+}
+
+static void put_value(const char *row)
+{
+    const uint8_t place = flash_u8(row + ROW_PLACE);
+    const uint8_t kind = flash_u8(row + ROW_KIND);
+    uint8_t offset = place & PLACE_OFFSET;
+    uint8_t more = place >> PLACE_MORE_BIT;
+    uint32_t value = 0;
+    uint8_t *byte = (uint8_t *)&value;
+    do {
+        *byte++ = store_setting(offset++);
+    } while (more-- > 0);
+    uint8_t lowest = (uint8_t)value;
+    if (kind == KIND_DIRECTION) {
+        const char *text = FLASH_TEXT("CCW");
+        if (lowest == 0) {
+            text++;
+        }
+        text_put_flash(text);
+    } else if (kind == KIND_MAP) {
+        for (uint8_t left = 7;; left--) {
+            terminal_port_put((uint8_t)('0' + lowest));
+            if (left == 0) {
+                break;
+            }
+            lowest = store_setting(offset++);
+        }
+    } else if (kind == KIND_RAMP) {
+        display_put_accel((accel_code_t)value);
+    } else {
+        if (kind == KIND_OPS && lowest != 0) {
+            value = 100100; /* in binary; there is no other */
+        }
+        text_put_u32(value);
+    }
+}
+
+static NOINLINE void put_hex_digit(uint8_t digit)
+{
+    terminal_port_put((uint8_t)(digit + (digit < 10 ? '0' : 'A' - 10)));
+}
+
+/* A byte of the EEPROM, sixteen a line. */
+static void put_byte(uint16_t address)
+{
+    const uint8_t byte = eeprom_port_read(address);
+    put_hex_digit(byte >> 4);
+    put_hex_digit(byte & 0x0F);
+    if ((address & 0x0F) == 0x0F) {
+        text_new_line();
+    } else {
+        terminal_port_put(' ');
+    }
+}
+
+/* The name and the tabs behind it: values stand in column 16, or 40. */
+static void put_name(const char *name)
+{
+    uint8_t column = 1;
+    for (uint8_t c; (c = flash_u8(name++)) != '\0'; column++) {
+        if (column == 1) {
+            terminal_port_put(' ');
+        }
+        terminal_port_put(c);
+    }
+    terminal_port_put('\t');
+    if (column < 7) {
+        terminal_port_put('\t');
+    }
+}
+
+/* A letter without a parameter has an empty cell. */
+void configure_put_cell(void)
+{
+    const uint16_t at = cell++;
+    if (at >= LIST_END) {
+        put_byte(at - LIST_END);
+        return;
+    }
+    const bool screen = at < SCREEN_END;
+    uint8_t letter = (uint8_t)at;
+    bool right = false; /* the end of a line */
+    if (screen) {
+        right = letter & 1;
+        letter = (uint8_t)((letter >> 1) + 'A');
+        if (right) {
+            letter |= 0x20;
+        }
+    }
+    const char *row = find(letter);
+    if (row != 0) {
+        if (right) {
+            terminal_port_put('\t');
+        }
+        terminal_port_put(letter);
+        if (screen) {
+            put_name(row + ROW_NAME);
+        } else {
+            terminal_port_put(' ');
+            right = true;
+        }
+        if (!screen || letter != 'D' || store_setting(flash_u8(row + ROW_PLACE)) != 0) {
+            put_value(row);
+        }
+    }
+    if (right) {
+        text_new_line();
+    }
+}
