@@ -421,7 +421,8 @@ static void test_xref_ends_continuous_and_the_loop_resumes(void)
     image_send("m-vc1000a999d999\r");
     image_run(300 * MS);
     image_send("x20\r");
-    image_until_state(STANDBY, 4 * SECOND);
+    while (train.pulse[train.count - 1].dir != 0)
+        image_run(MS);
     image_until_pulses(train.count + 33 + 13 + 5, 4 * SECOND);
     image_do("l");
     image_idle(LONG_WAIT);
