@@ -1,28 +1,40 @@
 /* Boot, then the polled loop: nothing else. */
 #include "base/atomic.h"
 #include "base/wake.h"
+#include "boot.h"
+#include "boot_port.h"
 #include "cli/commands.h"
 #include "cli/terminal.h"
 #include "cli/terminal_port.h"
+#include "cli/timebase_port.h"
 #include "motion/engine.h"
 #include "pins_port.h"
 #include "queue/queue.h"
 #include "settings.h"
 
-int main(void)
+void boot_start(void)
 {
-    pins_init();
     engine_init();
     commands_init();
     queue_init();
     terminal_port_init(settings.hw_baud);
-    terminal_init();
+}
+
+int main(void)
+{
+    pins_init();
+    boot_init();
+    boot_start();
+    terminal_init(boot_cause());
+    timebase_start();
     atomic_enable();
 
     for (;;) {
         /* Cleared before the polls: what an interrupt leaves to do meanwhile is seen in this round or the next. */
         wake_flag = 0;
-        bool worked = terminal_poll(); /* first: a line's end is what wakes a unit at rest, and its motion is awaited */
+        boot_port_alive();
+        /* First: a line's end is what wakes a unit at rest, and its motion is awaited. */
+        bool worked = boot_over() && terminal_poll();
         worked |= queue_poll();
         worked |= engine_poll();
         if (!worked) {

@@ -1,4 +1,6 @@
 #include "settings.h"
+#include "base/flash.h"
+#include "boot.h"
 
 /* Factory values (requirements, annex A; ihd, xclk and what later parts need follow with those parts). */
 #ifndef SETTINGS_CYCLE_US
@@ -62,3 +64,13 @@ settings_t settings = {
     .slow_rpm = SETTINGS_SLOW_RPM,
     .full_step = SETTINGS_FULL_STEP,
 };
+
+/* Until the settings are kept in EEPROM: what .data holds in flash. */
+#ifdef __AVR__
+extern const uint8_t __data_load_start[];
+extern uint8_t __data_start[];
+void boot_restore_factory(void)
+{
+    FLASH_COPY(&settings, __data_load_start + ((uint8_t *)&settings - __data_start), sizeof settings);
+}
+#endif

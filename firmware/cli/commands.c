@@ -3,7 +3,6 @@
 #include "base/inline.h"
 #include "cli/display.h"
 #include "cli/motion_syntax.h"
-#include "cli/timebase_port.h"
 #include "motion/engine.h"
 #include "queue/queue.h"
 #include "queue/session.h"
@@ -138,11 +137,6 @@ static status_t command_debug(const char *rest)
 {
     (void)rest;
     debugging = !debugging;
-    if (debugging) {
-        timebase_start();
-    } else {
-        timebase_stop();
-    }
     return STATUS_OK;
 }
 

@@ -168,18 +168,17 @@ static NOINLINE bool begin_line(uint8_t byte)
     return true;
 }
 
-void terminal_init(void)
+void terminal_init(status_t reported)
 {
     line_reset(&line);
     echoed = 0;
-    behind = false;
+    behind = true;
     owes_new_line = false;
     owes_times = 0;
     timing = false;
-    owed_status = STATUS_OK;
+    owed_status = reported;
     display_init();
     text_put_flash(version_line);
-    text_put_flash(prompt);
 }
 
 /* Takes what has arrived, up to the first byte that ends or changes a line otherwise than by one more character. */

@@ -4,16 +4,25 @@
 #include <avr/interrupt.h>
 #include <avr/io.h>
 #include "base/wake.h"
+#include "hal/timebase.h"
+#include "motion/segment.h"
 
 volatile uint8_t wake_flag;
 
 void wake_sleep(void)
 {
+    uint8_t overflows, counted, tail;
     SMCR = _BV(SE); /* mode 0 is IDLE */
-    cli();
-    if (wake_flag == 0) {
-        __asm__ volatile("sei\n\tsleep" : : : "memory");
-    }
-    sei();
+    do {
+        overflows = timebase_low();
+        counted = GPIOR0;
+        tail = step_tail;
+        cli();
+        if (wake_flag == 0) {
+            __asm__ volatile("sei\n\tsleep" : : : "memory");
+        }
+        sei();
+        /* Again, if it was the time base and no step. */
+    } while (wake_flag == 0 && timebase_low() != overflows && GPIOR0 == counted && step_tail == tail);
     SMCR = 0;
 }

@@ -199,5 +199,6 @@ run_out:
         sts     TIMSK1, r30             /* from here on nobody counts: the main loop stops the timer */
         ldi     r24, 1
         sts     step_idle, r24
+        sts     wake_flag, r24
         rjmp    leave
         .size TIMER1_OVF_vect, . - TIMER1_OVF_vect

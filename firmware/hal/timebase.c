@@ -1,34 +1,22 @@
-/* Timer0 at clock / 8 (0.5 us), counted on by its overflow interrupt every 128 us.
+/* Timer0 at clock / 8 (0.5 us), counted on by its overflow interrupt every 128 us (timebase_isr.S).
+ * It runs freely: who needs its compare units may rely on that.
  * Source: ATmega328P datasheet DS40002061, 15.7.1 (normal mode), 15.9. */
-#include <avr/interrupt.h>
 #include <avr/io.h>
 #include "base/atomic.h"
 #include "cli/timebase_port.h"
+#include "hal/timebase.h"
 
-/* Written by the interrupt; by the main loop only while the interrupt is off. */
-static volatile uint32_t overflows;
-
-/* Interruptible from its first instruction: the next overflow is 2,048 cycles away. */
-ISR(TIMER0_OVF_vect, ISR_NOBLOCK)
-{
-    overflows++;
-}
+volatile uint32_t timebase_overflows;
 
 void timebase_start(void)
 {
-    TCCR0B = 0;
-    TCCR0A = 0;
-    TCNT0 = 0;
-    overflows = 0;
-    TIFR0 = _BV(TOV0);
     TIMSK0 = _BV(TOIE0);
     TCCR0B = _BV(CS01);
 }
 
-void timebase_stop(void)
+uint8_t timebase_wraps(void)
 {
-    TIMSK0 = 0;
-    TCCR0B = 0;
+    return ((const volatile uint8_t *)&timebase_overflows)[1];
 }
 
 uint32_t timebase_us(void)
@@ -37,7 +25,7 @@ uint32_t timebase_us(void)
     uint8_t state = atomic_begin();
     uint8_t ticks = TCNT0;
     const uint8_t flags = TIFR0;
-    uint32_t high = overflows;
+    uint32_t high = timebase_overflows;
     atomic_end(state);
     if ((flags & _BV(TOV0)) != 0 && ticks < 128) {
         high++; /* overflowed, not yet counted */

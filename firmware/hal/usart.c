@@ -39,6 +39,11 @@ uint8_t terminal_port_waiting(void)
     return (uint8_t)(head >= tail ? head - tail : head + USART_RX_BYTES - tail);
 }
 
+uint8_t terminal_port_peek(uint8_t others)
+{
+    return usart_rx_bytes[others];
+}
+
 uint8_t terminal_port_free(void)
 {
     return (uint8_t)((usart_tx_tail - usart_tx_head - 1) & (USART_TX_BYTES - 1));

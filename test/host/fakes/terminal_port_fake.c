@@ -95,3 +95,9 @@ void terminal_port_put(uint8_t byte)
     sent[sent_count++] = (char)byte;
     sent[sent_count] = '\0';
 }
+
+uint8_t terminal_port_peek(uint8_t others)
+{
+    assert(taken_count == 0 && others < typed_count);
+    return typed[others];
+}
