@@ -7,6 +7,7 @@
 #include "cli/terminal.h"
 #include "cli/terminal_port.h"
 #include "cli/timebase_port.h"
+#include "drivers.h"
 #include "motion/engine.h"
 #include "pins_port.h"
 #include "queue/queue.h"
@@ -14,6 +15,8 @@
 
 void boot_start(void)
 {
+    const uint8_t ustep = drivers_ustep(settings.driver, settings.ustep);
+    pins_microsteps(drivers_pins(settings.driver, ustep, settings.driver_map));
     engine_init();
     commands_init();
     queue_init();

@@ -42,6 +42,9 @@
 #ifndef SETTINGS_SLOW_RPM
 #define SETTINGS_SLOW_RPM 10
 #endif
+#ifndef SETTINGS_DRIVER
+#define SETTINGS_DRIVER 0
+#endif
 #ifndef SETTINGS_FULL_STEP
 #define SETTINGS_FULL_STEP 1
 #endif
@@ -62,6 +65,8 @@ settings_t settings = {
     .ustep = SETTINGS_USTEP,
     .pulse_us = SETTINGS_PULSE_US,
     .slow_rpm = SETTINGS_SLOW_RPM,
+    .driver = SETTINGS_DRIVER,
+    .driver_map = {0, 1, 2, 3, 4, 5, 6, 7},
     .full_step = SETTINGS_FULL_STEP,
 };
 

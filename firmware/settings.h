@@ -23,6 +23,8 @@ typedef struct {
     uint8_t ustep;           /* J: microsteps as a power of two, 0..7 */
     uint8_t pulse_us;        /* K: width of the clk pulse, >= 1 */
     uint8_t slow_rpm;        /* L: start, stop and reversal speed, >= 1 */
+    uint8_t driver;          /* N: 0 A4988, 1 DRV8825, 2 by driver_map */
+    uint8_t driver_map[8];   /* U: the pins MS3 MS2 MS1 of each ustep */
     uint8_t full_step;       /* u: 1 counts are full steps, 0 pulses */
 } settings_t;
 

@@ -7,7 +7,7 @@ A folder may include itself and lower ones, never a sibling or a higher one:
 
 hal/ implements headers that its users own (motion/step_port.h and its like), so it may include any folder's headers,
 and nobody but main.c includes hal/. settings.h stands above motion/command.h, boot.h above base; board.h, the pin map,
-and version.h include nothing; all four may be read by everyone but base. Only hal/ and the files in HARDWARE may include <avr/...> and <util/...>:
+drivers.h and version.h include nothing; all five may be read by everyone but base. Only hal/ and the files in HARDWARE may include <avr/...> and <util/...>:
 everything else must build on the host.
 
 Exit code 1 if a rule is broken; each breach is printed as file:line.
@@ -32,7 +32,7 @@ def room(path):
     if len(parts) > 1:
         return parts[0]
     return {"settings.h": "settings", "settings.c": "settings", "board.h": "board", "version.h": "version",
-            "boot.h": "boot"}.get(parts[0], "main")
+            "boot.h": "boot", "drivers.h": "drivers"}.get(parts[0], "main")
 
 
 def resolve(root, includer, name):
@@ -48,14 +48,14 @@ def breach(user, used, used_path):
     """Returns what is wrong with a file of room `user` including a file of room `used`, or None."""
     if user == used or user in ("hal", "main"):
         return None
-    if used in ("board", "version", "boot", "settings"):
+    if used in ("board", "version", "boot", "drivers", "settings"):
         return f"base knows no {used}" if user == "base" else None
     if user == "settings":
         return None if used in ("base", "motion") else f"settings may not include {used_path}"
     if user == "boot":
         return None if used == "base" else "boot.h includes nothing above base"
-    if user in ("board", "version"):
-        return "board.h and version.h include nothing"
+    if user in ("board", "drivers", "version"):
+        return "board.h, drivers.h and version.h include nothing"
     if used == "hal":
         return "hal/ is bound at link time: include the port header that hal/ implements"
     if user not in LEVEL or used not in LEVEL:

@@ -7,6 +7,7 @@
 #include "motion/ramp.h"
 #include "motion/segment.h"
 #include "motion/step_port.h"
+#include "drivers.h"
 #include "settings.h"
 
 #define TICKS_PER_US 16u
@@ -103,7 +104,8 @@ static uint8_t direction_flags(const motion_command_t *c, bool turn)
 
 void engine_init(void)
 {
-    profile_basis(&basis, settings.steps_per_rev, settings.ustep, settings.slow_rpm);
+    profile_basis(&basis, settings.steps_per_rev, drivers_ustep(settings.driver, settings.ustep),
+                  settings.slow_rpm);
     v_in_play = basis.v_slow;
     certain_centi = (130000000u >> basis.factor_log2) / basis.steps_per_rev;
     width_ticks = (uint16_t)settings.pulse_us * TICKS_PER_US;
