@@ -10,6 +10,8 @@
 #include "drivers.h"
 #include "motion/engine.h"
 #include "pins_port.h"
+#include "queue/encoder.h"
+#include "queue/encoder_port.h"
 #include "queue/queue.h"
 #include "settings.h"
 
@@ -30,6 +32,7 @@ int main(void)
     boot_start();
     terminal_init(boot_cause());
     timebase_start();
+    encoder_init();
     atomic_enable();
 
     for (;;) {
@@ -38,6 +41,7 @@ int main(void)
         boot_port_alive();
         /* First: a line's end is what wakes a unit at rest, and its motion is awaited. */
         bool worked = boot_over() && terminal_poll();
+        worked |= encoder_poll();
         worked |= queue_poll();
         worked |= engine_poll();
         if (!worked) {

@@ -4,6 +4,7 @@
 #include "cli/display.h"
 #include "cli/motion_syntax.h"
 #include "motion/engine.h"
+#include "queue/encoder.h"
 #include "queue/queue.h"
 #include "queue/session.h"
 
@@ -175,6 +176,13 @@ static status_t command_toggle_steps(const char *rest)
 {
     (void)rest;
     session.flags ^= MOTION_PULSES;
+    return STATUS_OK;
+}
+
+static status_t command_encoder(const char *rest)
+{
+    (void)rest;
+    encoder_toggle();
     return STATUS_OK;
 }
 

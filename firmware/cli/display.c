@@ -4,6 +4,7 @@
 #include "cli/terminal_port.h"
 #include "cli/text.h"
 #include "motion/engine.h"
+#include "queue/encoder.h"
 #include "queue/queue.h"
 #include "queue/session.h"
 
@@ -62,6 +63,7 @@ enum {
 #define LINEAR "\xC4"
 #define SYNC "\xC8"
 #define GAP "\xE0"
+#define THROTTLE CCW /* a session has no direction */
 enum { CHOICE_ELSE = 0xA0, CHOICE_END = 0xA1, CHOICE_BEGIN = 0xC0 };
 _Static_assert(MOTION_CCW == 0x01 && MOTION_PULSES == 0x02 && MOTION_LINEAR == 0x04 && MOTION_SYNC == 0x08 &&
                    SHOWN_GAP == 0x20,
@@ -81,12 +83,12 @@ static const char queue_row_text[] FLASH =
 static const char queue_end_text[] FLASH = RULE "Q is at " NEXT "\t+ pulse\t\t\t* linear\t\ts sync\r\n";
 static const char queue_executing_text[] FLASH = "executing " EXECUTING "\r\n";
 
-/* What EnF and the last line stand for is not built yet; they read as they will at its factory values. */
+/* What the last line stands for is not built yet; it reads as it will at its factory values. */
 /* clang-format off */
 static const char defaults_text[] FLASH =
     "v " RPM " cycle " CYCLE "\r\n"
     "a " ACCEL " d " DECEL " " CHOICE(LINEAR, "linear", "harmonic") "\r\n"
-    "GAP " CHOICE(GAP, "on", "off") ", " CHOICE(PULSES, "pulses", "full step") ", EnF\r\n"
+    "GAP " CHOICE(GAP, "on", "off") ", " CHOICE(PULSES, "pulses", "full step") ", En" CHOICE(THROTTLE, "T", "F") "\r\n"
     "ops 36, soft_ops off, CRC 1, ACK on\r\n";
 /* clang-format on */
 
@@ -165,6 +167,9 @@ static void begin(uint8_t display)
     shown_session = session;
     if (engine_gap()) {
         shown_session.flags |= SHOWN_GAP;
+    }
+    if (encoder_throttles()) {
+        shown_session.flags |= MOTION_CCW;
     }
 }
 

@@ -156,6 +156,19 @@ static void test_cf_shows_the_session_defaults_and_the_flags(void)
     TEST_ASSERT_NOT_NULL(strstr(shown("cf"), "a 10.47 d 10.47 linear\r\n"));
 }
 
+/* ENC-008, ENC-009 */
+static void test_cf_shows_what_the_encoder_does(void)
+{
+    engine_fake.state = MOTION_CRUISE;
+    TEST_ASSERT_NOT_NULL(strstr(shown("cf"), "full step, EnT\r\n"));
+    engine_fake.state = MOTION_STANDBY;
+    TEST_ASSERT_NOT_NULL(strstr(shown("cf"), "full step, EnF\r\n"));
+    execute("$n");
+    TEST_ASSERT_NOT_NULL(strstr(shown("cf"), "full step, EnT\r\n"));
+    execute("$n");
+    TEST_ASSERT_NOT_NULL(strstr(shown("cf"), "full step, EnF\r\n"));
+}
+
 /* VEL-007 */
 static void test_vd_shows_rpm_and_cycle_of_the_velocity_in_play(void)
 {
@@ -241,6 +254,7 @@ int main(void)
     RUN_TEST(test_extra_pulses_and_start_wait_are_shown);
     RUN_TEST(test_debug_shows_position_0_and_what_is_executed);
     RUN_TEST(test_cf_shows_the_session_defaults_and_the_flags);
+    RUN_TEST(test_cf_shows_what_the_encoder_does);
     RUN_TEST(test_vd_shows_rpm_and_cycle_of_the_velocity_in_play);
     RUN_TEST(test_p_shows_position_state_and_faults);
     RUN_TEST(test_the_list_has_one_line_for_each_available_command);
