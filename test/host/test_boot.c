@@ -155,7 +155,6 @@ static void test_escapes_behind_the_window_restore_nothing(void)
     TEST_ASSERT_EQUAL_UINT(0, restored);
 }
 
-/* PIN-010, EST-003 */
 static void test_rst_low_at_a_cold_start_restores_at_once(void)
 {
     rst_low = true;

@@ -58,7 +58,7 @@ static void test_in_standby_each_line_is_a_pulse_in_its_direction(void)
     TEST_ASSERT_FALSE(encoder_throttles());
 }
 
-/* ENC-002, ENC-004, ENC-007 */
+/* ENC-002, ENC-007 */
 static void test_in_motion_lines_are_rpm_and_no_pulses(void)
 {
     static const motion_state_t states[] = {MOTION_ACCEL, MOTION_CRUISE, MOTION_DECEL, MOTION_STOP};

@@ -108,7 +108,7 @@ static void test_a_second_passes_before_the_first_prompt(void)
     image_assert_near("window after power-on again, s", 1.0, (double)window() / (double)SECOND, 0.1);
 }
 
-/* BOO-003, BOO-006 */
+/* BOO-003 */
 static void test_escape_three_times_in_the_window_restores_the_factory_settings(void)
 {
     IMAGE_SET(cycle_us, 2000);
@@ -122,12 +122,13 @@ static void test_escape_three_times_in_the_window_restores_the_factory_settings(
 static void test_escapes_far_apart_and_other_bytes_around_them_restore_too(void)
 {
     IMAGE_SET(cycle_us, 2000);
+    image_run(100 * MS);
     image_send("m5\r\x1B");
     image_run(300 * MS);
     image_send("\x1B");
     image_run(300 * MS);
     image_send("\x1Bq");
-    image_prompt();
+    image_run(800 * MS);
     clear_line();
     assert_cycle(3000);
 }
@@ -140,8 +141,9 @@ static void test_anything_else_in_the_window_restores_nothing(void)
         image_off();
         image_power_on();
         IMAGE_SET(cycle_us, 2000);
+        image_run(100 * MS); /* the port listens */
         image_send(typed[i]);
-        image_prompt();
+        image_run(1400 * MS);
         clear_line();
         assert_cycle(2000);
     }
@@ -200,7 +202,6 @@ static void test_a_flood_in_the_window_restores_nothing_and_leaves_the_unit_at_w
 
 /* -- RST ----------------------------------------------------------------------------------------------------------- */
 
-/* PIN-010, EST-003, EST-004 */
 static void test_rst_held_low_at_power_on_restores_the_factory_settings(void)
 {
     IMAGE_SET(cycle_us, 2000);
@@ -211,7 +212,7 @@ static void test_rst_held_low_at_power_on_restores_the_factory_settings(void)
     assert_alive();
 }
 
-/* PIN-019: biased high, it takes more than a glitch */
+/* Biased high; it takes more than a glitch. */
 static void test_rst_open_or_low_for_a_moment_restores_nothing(void)
 {
     IMAGE_SET(cycle_us, 2000);
