@@ -116,6 +116,23 @@ static void test_edges_there_and_back_are_no_pulses(void)
     assert_made(2, 0);
 }
 
+/* Over before the interrupt looks, both edges one flag: not even where one edge is missing to a line. */
+static void test_a_spike_is_no_edge(void)
+{
+    turn(CW, 3, MS);
+    for (unsigned i = 0; i < 20; i++) {
+        board_pin_t pin = i & 1 ? EN_A : EN_B;
+        int level = board_pin_level(board, pin);
+        board_pin_drive(board, pin, !level);
+        image_run(2);
+        board_pin_drive(board, pin, level);
+        image_run(MS);
+    }
+    assert_made(0, 0);
+    turn(CW, 1, MS);
+    assert_made(1, 1);
+}
+
 static void test_both_edges_at_once_are_no_pulse(void)
 {
     for (unsigned i = 0; i < 40; i++) {
@@ -255,6 +272,7 @@ int main(void)
     RUN_TEST(test_two_turns_of_100_lines_are_200_pulses);
     RUN_TEST(test_it_counts_from_wherever_it_stands_at_power_on);
     RUN_TEST(test_edges_there_and_back_are_no_pulses);
+    RUN_TEST(test_a_spike_is_no_edge);
     RUN_TEST(test_both_edges_at_once_are_no_pulse);
     RUN_TEST(test_a_fast_encoder_loses_no_line);
     RUN_TEST(test_in_motion_lines_make_no_pulses);
