@@ -32,6 +32,8 @@ UNITY ?= $(firstword $(wildcard .tools/unity /usr/share/cmock/vendor/unity/src) 
 
 FIRMWARE_SRCS := \
     firmware/main.c \
+    firmware/boot.c \
+    firmware/drivers.c \
     firmware/settings.c \
     firmware/base/number.c \
     firmware/base/wide.S \
@@ -43,6 +45,7 @@ FIRMWARE_SRCS := \
     firmware/motion/block.S \
     firmware/motion/profile.c \
     firmware/motion/engine.c \
+    firmware/queue/encoder.c \
     firmware/queue/queue.c \
     firmware/queue/session.c \
     firmware/cli/commands.c \
@@ -53,8 +56,12 @@ FIRMWARE_SRCS := \
     firmware/cli/terminal.c \
     firmware/cli/text.c \
     firmware/hal/eeprom.c \
+    firmware/hal/encoder.c \
+    firmware/hal/encoder_isr.S \
     firmware/hal/sleep.c \
     firmware/hal/pins.c \
+    firmware/hal/reset.c \
+    firmware/hal/reset_init.S \
     firmware/hal/step_isr.S \
     firmware/hal/step_timer.c \
     firmware/hal/timebase.c \
@@ -67,11 +74,13 @@ FIRMWARE_SRCS := \
 # needed on the host alone, and assembler on the AVR alone.
 
 HOST_TESTS := test_number test_status test_baud test_line test_settings test_store test_session test_queue \
-    test_motion_syntax test_commands test_configure test_display test_terminal test_wide test_block test_ramp test_profile test_engine test_property_planner
+    test_encoder test_motion_syntax test_commands test_configure test_display test_terminal test_boot test_drivers \
+    test_wide test_block test_ramp test_profile test_engine test_property_planner
 FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 STORE_SRCS := firmware/eeprom/store.c firmware/base/crc16.c firmware/settings.c test/host/fakes/eeprom_port_fake.c
 CLI_SRCS := firmware/cli/commands.c firmware/cli/configure.c firmware/cli/display.c firmware/cli/text.c firmware/cli/motion_syntax.c \
-    firmware/base/number.c firmware/queue/queue.c firmware/queue/session.c $(STORE_SRCS) $(FAKE_SRCS)
+    firmware/base/number.c firmware/queue/encoder.c firmware/queue/queue.c firmware/queue/session.c $(STORE_SRCS) \
+    test/host/fakes/encoder_port_fake.c $(FAKE_SRCS)
 test_number_SRCS := firmware/base/number.c
 test_status_SRCS := firmware/base/status.c
 test_line_SRCS := firmware/cli/line.c
@@ -79,19 +88,23 @@ test_settings_SRCS := firmware/settings.c
 test_store_SRCS := $(STORE_SRCS)
 test_session_SRCS := firmware/queue/session.c firmware/settings.c
 test_queue_SRCS := firmware/queue/queue.c firmware/queue/session.c $(STORE_SRCS) $(FAKE_SRCS)
+test_encoder_SRCS := firmware/queue/encoder.c test/host/fakes/encoder_port_fake.c test/host/fakes/engine_fake.c \
+    test/host/fakes/terminal_port_fake.c firmware/settings.c
 test_motion_syntax_SRCS := firmware/cli/motion_syntax.c firmware/base/number.c firmware/queue/session.c \
     firmware/settings.c $(FAKE_SRCS)
 test_commands_SRCS := $(CLI_SRCS)
 test_configure_SRCS := $(CLI_SRCS)
 test_display_SRCS := $(CLI_SRCS)
 test_terminal_SRCS := $(CLI_SRCS) firmware/cli/terminal.c firmware/cli/line.c firmware/base/status.c
+test_boot_SRCS := firmware/boot.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
+test_drivers_SRCS := firmware/drivers.c
 test_wide_SRCS := firmware/base/wide.S
 test_block_SRCS := firmware/motion/block.c firmware/motion/block.S
 RAMP_SRCS := firmware/motion/ramp.c firmware/base/wide.S
 test_ramp_SRCS := $(RAMP_SRCS)
 test_ramp_HOST_SRCS := test/host/motion_exact.c
 test_profile_SRCS := firmware/motion/profile.c $(RAMP_SRCS)
-ENGINE_SRCS := firmware/motion/engine.c firmware/motion/block.c firmware/motion/profile.c firmware/motion/ramp.c firmware/settings.c \
+ENGINE_SRCS := firmware/drivers.c firmware/motion/engine.c firmware/motion/block.c firmware/motion/profile.c firmware/motion/ramp.c firmware/settings.c \
     test/host/fakes/step_player.c
 test_engine_SRCS := $(ENGINE_SRCS)
 test_property_planner_SRCS := $(ENGINE_SRCS) test/host/motion_exact.c
@@ -100,7 +113,7 @@ test_property_planner_SRCS := $(ENGINE_SRCS) test/host/motion_exact.c
 AVR_TESTS := test_number test_line test_session test_wide test_block test_ramp test_profile
 
 # Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
-IMAGE_TESTS := test_image_motion test_image_queue test_image_sequence test_image_terminal test_image_stop \
+IMAGE_TESTS := test_image_boot test_image_pins test_image_encoder test_image_motion test_image_queue test_image_sequence test_image_terminal test_image_stop \
     test_image_configure test_image_timing test_image_stress
 # What every whole-image test is linked with.
 IMAGE_COMMON_SRCS := test/image/image.c test/image/model.c

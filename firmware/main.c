@@ -1,30 +1,72 @@
 /* Boot, then the polled loop: nothing else. */
 #include "base/atomic.h"
 #include "base/wake.h"
+#include "boot.h"
+#include "boot_port.h"
 #include "cli/commands.h"
 #include "cli/terminal.h"
 #include "cli/terminal_port.h"
+#include "cli/timebase_port.h"
+#include "drivers.h"
 #include "eeprom/store.h"
 #include "motion/engine.h"
 #include "pins_port.h"
+#include "queue/encoder.h"
+#include "queue/encoder_port.h"
 #include "queue/queue.h"
 #include "settings.h"
 
-int main(void)
+static status_t snapshot; /* what became of the saved queue */
+
+void boot_restart(void)
 {
-    store_load_settings();
-    pins_init();
+    const uint8_t ustep = drivers_ustep(settings.driver_id, settings.ustep);
+    pins_microsteps(drivers_pins(settings.driver_id, ustep, settings.driver_map));
     engine_init();
     commands_init();
-    queue_init();
     terminal_port_init(settings.hw_baud);
-    terminal_init();
+}
+
+void boot_start(void)
+{
+    boot_restart();
+    queue_init();
+    snapshot = queue_restore();
+}
+
+void boot_restore_factory(void)
+{
+    store_restore_factory();
+    settings_to_factory();
+}
+
+int main(void)
+{
+    pins_init();
+    store_load_settings();
+    boot_init();
+    boot_start();
+    terminal_init(boot_cause() != STATUS_OK ? boot_cause() : snapshot == STATUS_SNAPSHOT ? snapshot : STATUS_OK);
+    timebase_start();
+    encoder_init();
     atomic_enable();
 
+    bool started = false;
     for (;;) {
         /* Cleared before the polls: what an interrupt leaves to do meanwhile is seen in this round or the next. */
         wake_flag = 0;
-        bool worked = terminal_poll(); /* first: a line's end is what wakes a unit at rest, and its motion is awaited */
+        boot_port_alive();
+        bool worked = false;
+        if (boot_over()) {
+            if (!started) {
+                started = true;
+                if (boot_autorun_allowed() && snapshot == STATUS_OK && settings.autorun != 0) {
+                    queue_loop_from_first(settings.autorun);
+                }
+            }
+            worked = terminal_poll(); /* first: a line's end is what wakes a unit at rest, and its motion is awaited */
+        }
+        worked |= encoder_poll();
         worked |= queue_poll();
         worked |= engine_poll();
         worked |= store_poll();

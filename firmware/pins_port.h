@@ -1,9 +1,13 @@
-/* The pins at boot; implemented by hal/pins.c from the table in board.h.
+/* The pins; implemented by hal/pins.c from the table in board.h.
  *
- * Context: boot, before anything else. Errors: none. Tests: test/image. */
+ * Context: main loop. Errors: none. Tests: test/image/test_image_pins.c */
 #ifndef PINS_PORT_H
 #define PINS_PORT_H
 
-void pins_init(void); /* directions, pull-ups and idle levels */
+#include <stdint.h>
+
+void pins_init(void); /* at boot, before anything else: directions, pull-ups and idle levels */
+
+void pins_microsteps(uint8_t pins); /* MS1 (bit 0), MS2, MS3 */
 
 #endif

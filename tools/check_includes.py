@@ -6,8 +6,8 @@ A folder may include itself and lower ones, never a sibling or a higher one:
     base  <  motion, eeprom, net  <  queue  <  cli  <  main.c
 
 hal/ implements headers that its users own (motion/step_port.h and its like), so it may include any folder's headers,
-and nobody but main.c includes hal/. settings.h stands above motion/command.h; board.h, the pin map, and version.h include
-nothing; all three may be read by everyone but base. Only hal/ and the files in HARDWARE may include <avr/...> and <util/...>:
+and nobody but main.c includes hal/. settings.h stands above motion/command.h, boot.h above base; board.h, the pin map,
+drivers.h and version.h include nothing; all five may be read by everyone but base. Only hal/ and the files in HARDWARE may include <avr/...> and <util/...>:
 everything else must build on the host.
 
 Exit code 1 if a rule is broken; each breach is printed as file:line.
@@ -31,7 +31,8 @@ def room(path):
     parts = pathlib.PurePosixPath(path).parts
     if len(parts) > 1:
         return parts[0]
-    return {"settings.h": "settings", "settings.c": "settings", "settings.def": "settings", "board.h": "board", "version.h": "version"}.get(parts[0], "main")
+    return {"settings.h": "settings", "settings.c": "settings", "settings.def": "settings", "board.h": "board", "version.h": "version",
+            "boot.h": "boot", "drivers.h": "drivers"}.get(parts[0], "main")
 
 
 def resolve(root, includer, name):
@@ -47,12 +48,14 @@ def breach(user, used, used_path):
     """Returns what is wrong with a file of room `user` including a file of room `used`, or None."""
     if user == used or user in ("hal", "main"):
         return None
-    if used in ("board", "version", "settings"):
+    if used in ("board", "version", "boot", "drivers", "settings"):
         return f"base knows no {used}" if user == "base" else None
     if user == "settings":
         return None if used in ("base", "motion") else f"settings may not include {used_path}"
-    if user in ("board", "version"):
-        return "board.h and version.h include nothing"
+    if user == "boot":
+        return None if used == "base" else "boot.h includes nothing above base"
+    if user in ("board", "drivers", "version"):
+        return "board.h, drivers.h and version.h include nothing"
     if used == "hal":
         return "hal/ is bound at link time: include the port header that hal/ implements"
     if user not in LEVEL or used not in LEVEL:

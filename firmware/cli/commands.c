@@ -3,11 +3,14 @@
 #include "base/inline.h"
 #include "base/number.h"
 #include "base/zeroed.h"
+#include "boot.h"
 #include "cli/configure.h"
 #include "cli/display.h"
 #include "cli/motion_syntax.h"
-#include "cli/timebase_port.h"
+#include "cli/terminal_port.h"
+#include "eeprom/store.h"
 #include "motion/engine.h"
+#include "queue/encoder.h"
 #include "queue/queue.h"
 #include "queue/session.h"
 
@@ -331,11 +334,6 @@ static status_t command_debug(const char *rest)
 {
     (void)rest;
     debugging = !debugging;
-    if (debugging) {
-        timebase_start();
-    } else {
-        timebase_stop();
-    }
     return STATUS_OK;
 }
 
@@ -373,6 +371,25 @@ static status_t command_toggle_steps(const char *rest)
 {
     (void)rest;
     session.flags ^= MOTION_PULSES;
+    return STATUS_OK;
+}
+
+static status_t command_encoder(const char *rest)
+{
+    (void)rest;
+    encoder_toggle();
+    return STATUS_OK;
+}
+
+/* $R: the settings as they are stored, when all that is being written and sent is out. */
+static status_t command_reset(const char *rest)
+{
+    (void)rest;
+    if (store_busy() || !terminal_port_idle()) {
+        return STATUS_WAIT;
+    }
+    (void)store_load_settings();
+    boot_restart();
     return STATUS_OK;
 }
 

@@ -8,6 +8,7 @@
 #include "cli/text.h"
 #include "eeprom/store.h"
 #include "motion/engine.h"
+#include "queue/encoder.h"
 #include "queue/queue.h"
 #include "queue/session.h"
 
@@ -73,6 +74,7 @@ enum {
 #define SYNC "\xC8"
 #define GAP "\xE0"
 #define DEBUG SYNC
+#define THROTTLE CCW /* a session has no direction */
 enum { CHOICE_ELSE = 0xA0, CHOICE_END = 0xA1, CHOICE_BEGIN = 0xC0 };
 _Static_assert(MOTION_CCW == 0x01 && MOTION_PULSES == 0x02 && MOTION_LINEAR == 0x04 && MOTION_SYNC == 0x08 &&
                    SHOWN_GAP == 0x20,
@@ -95,12 +97,12 @@ static const char queue_text[] FLASH = QUEUE_HEAD
     RULE "Q is at " NEXT "\t+ pulse\t\t\t* linear\t\ts sync\r\n"
     CHOICE(DEBUG, "executing " EXECUTING "\r\n", "");
 /* clang-format on */
-/* What EnF and the last line stand for is not built yet; they read as they will at its factory values. */
+/* What the last line stands for is not built yet; it reads as it will at its factory values. */
 /* clang-format off */
 static const char defaults_text[] FLASH =
     "v " RPM " cycle " CYCLE "\r\n"
     "a " ACCEL " d " DECEL " " CHOICE(LINEAR, "linear", "harmonic") "\r\n"
-    "GAP " CHOICE(GAP, "on", "off") ", " CHOICE(PULSES, "pulses", "full step") ", EnF\r\n"
+    "GAP " CHOICE(GAP, "on", "off") ", " CHOICE(PULSES, "pulses", "full step") ", " CHOICE(THROTTLE, "EnT", "EnF") "\r\n"
     "ops 36, soft_ops off, CRC 1, ACK on\r\n";
 /* clang-format on */
 
@@ -188,6 +190,9 @@ static void begin(uint8_t display)
         if (display == DISPLAY_QUEUE) {
             shown.row = UINT8_MAX; /* positions 0 and 31 are shown in debug mode only */
         }
+    }
+    if (encoder_throttles()) {
+        flags |= MOTION_CCW;
     }
     shown.session.flags = flags;
 }

@@ -145,8 +145,8 @@ static NOINLINE void end_line(void)
     struct terminal *const t = self();
     const uint8_t timed = line_begun(&line) ? t->timing : 0;
     if (timed) {
-        t->received_us = timebase_us();
-        timebase_start();
+        t->loaded_us = timebase_us();
+        t->received_us = t->loaded_us - t->received_us;
     }
     status_t status = line.status;
     if (status == STATUS_OK) {
@@ -160,7 +160,7 @@ static NOINLINE void end_line(void)
         return;
     }
     if (timed && commands_debugging()) {
-        t->loaded_us = timebase_us();
+        t->loaded_us = timebase_us() - t->loaded_us;
         t->owes_times = 2;
     }
     line_reset(&line);
@@ -176,18 +176,19 @@ static bool begin_line(uint8_t byte)
     terminal.timing = false;
     if (commands_debugging() && terminal.owes_times == 0) {
         terminal.timing = true;
-        timebase_start();
+        terminal.received_us = timebase_us();
     }
     return true;
 }
 
-void terminal_init(void)
+void terminal_init(status_t reported)
 {
     AT_BOOT_ZERO(line);
     AT_BOOT_ZERO(terminal);
     display_init();
+    terminal.behind = true;
+    terminal.owed_status = reported;
     text_put_flash(version_line);
-    text_put_flash(commands_prompt());
 }
 
 /* Takes what has arrived, up to the first byte that ends or changes a line otherwise than by one more character. */

@@ -13,8 +13,10 @@
 #define CLI_TERMINAL_H
 
 #include <stdbool.h>
+#include "base/status.h"
 
-void terminal_init(void); /* prints the version line and the first prompt; the port is ready */
+/* The port is ready: prints the version line. The first polls print what is reported, if not STATUS_OK, and the prompt. */
+void terminal_init(status_t reported);
 
 bool terminal_poll(void); /* takes a few bytes in, sends what is owed; true if it did anything */
 

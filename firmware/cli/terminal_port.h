@@ -6,6 +6,7 @@
 #ifndef CLI_TERMINAL_PORT_H
 #define CLI_TERMINAL_PORT_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #define TERMINAL_PORT_DAMAGED 0xFFu
@@ -15,6 +16,10 @@ void terminal_port_init(uint32_t baud); /* 300..2,000,000; the nearest divisor i
 int16_t terminal_port_get(void);     /* -1: nothing has arrived */
 uint8_t terminal_port_waiting(void); /* how many bytes have arrived and not been taken, 0..111 */
 
+/* What terminal_port_get() will return after so many others; only as long as none has been taken since boot. */
+uint8_t terminal_port_peek(uint8_t others);
+
+bool terminal_port_idle(void);        /* all that was put has left the pin */
 uint8_t terminal_port_free(void);     /* how many bytes terminal_port_put() would take now, 0..31 */
 void terminal_port_put(uint8_t byte); /* only while terminal_port_free() is not 0 */
 

@@ -3,7 +3,6 @@
 #include "pins_port.h"
 #include <avr/io.h>
 
-
 /* All inputs have their pull-up on (manual lines 217, 678). */
 void pins_init(void)
 {
@@ -36,4 +35,11 @@ void pins_init(void)
     OCR2A = 7;
     TCCR2A = 1 << COM2A0 | 1 << WGM21;
     TCCR2B = 1 << CS20;
+}
+
+/* A one written to PINx toggles its bit of PORTx (datasheet 14.2.2): no other pin is touched, whatever interrupts do. */
+void pins_microsteps(uint8_t pins)
+{
+    PINC = (uint8_t)((PORTC ^ pins << 3) & (1 << 3 | 1 << 4));
+    PINB = (uint8_t)((PORTB ^ pins << 2) & 1 << 4);
 }

@@ -1,32 +1,30 @@
-/* Timer0 at clock / 8 (0.5 us), counted on by its overflow interrupt every 128 us (timebase_isr.S).
+/* Timer0 at clock / 64 (4 us), counted on by its overflow interrupt every 1.024 ms (timebase_isr.S): seldom enough to cost
+ * nothing that matters, often enough for the main loop to be woken for the watchdog.
  * Source: ATmega328P datasheet DS40002061, 15.7.1 (normal mode), 15.9. */
 #include <avr/io.h>
 #include "base/atomic.h"
 #include "cli/timebase_port.h"
 
-/* Written by the interrupt; by the main loop only while the interrupt is off. */
+/* Written by the interrupt. */
 volatile uint32_t timebase_overflows;
 
 void timebase_start(void)
 {
-    TCCR0B = 0;
-    TCCR0A = 0;
-    TCNT0 = 0;
-    timebase_overflows = 0;
-    TIFR0 = _BV(TOV0);
     TIMSK0 = _BV(TOIE0);
-    TCCR0B = _BV(CS01);
+    TCCR0B = _BV(CS01) | _BV(CS00);
 }
 
-void timebase_stop(void)
+uint8_t timebase_32ms(void)
 {
-    TIMSK0 = 0;
-    TCCR0B = 0;
+    uint8_t state = atomic_begin();
+    uint16_t overflows = (uint16_t)timebase_overflows;
+    atomic_end(state);
+    return (uint8_t)(overflows >> 5);
 }
 
 uint32_t timebase_us(void)
 {
-    /* The atomic sections stay short: the flag, the low half and the count are compared afterwards. */
+    /* The atomic section stays short: the flag, the low byte and the count are compared afterwards. */
     uint8_t state = atomic_begin();
     uint8_t ticks = TCNT0;
     const uint8_t flags = TIFR0;
@@ -35,5 +33,5 @@ uint32_t timebase_us(void)
     if ((flags & _BV(TOV0)) != 0 && ticks < 128) {
         high++; /* overflowed, not yet counted */
     }
-    return (high << 7) | (ticks >> 1);
+    return high << 10 | (uint16_t)(ticks << 2);
 }

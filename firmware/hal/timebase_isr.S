@@ -1,4 +1,4 @@
-; Counts the overflows of Timer0 for timebase.c. Interruptible from its first instruction: the next overflow is 2,048
+; Counts the overflows of Timer0 for timebase.c. Interruptible from its first instruction: the next overflow is 16,384
 ; cycles away.
 
 #include <avr/io.h>

@@ -40,13 +40,24 @@ NOINLINE uint8_t terminal_port_waiting(void)
     return (uint8_t)(head >= tail ? head - tail : head + USART_RX_BYTES - tail);
 }
 
+uint8_t terminal_port_peek(uint8_t others)
+{
+    return usart_rx_bytes[others];
+}
+
 uint8_t terminal_port_free(void)
 {
     return (uint8_t)((usart_tx_tail - usart_tx_head - 1) & (USART_TX_BYTES - 1));
 }
 
+bool terminal_port_idle(void)
+{
+    return usart_tx_tail == usart_tx_head && (UCSR0A & _BV(TXC0)) != 0;
+}
+
 void terminal_port_put(uint8_t byte)
 {
+    UCSR0A = (uint8_t)((UCSR0A & _BV(U2X0)) | _BV(TXC0)); /* cleared, until this one is out (20.11.2) */
     const uint8_t head = usart_tx_head;
     usart_tx_bytes[head] = byte;
     usart_tx_head = (uint8_t)((head + 1) & (USART_TX_BYTES - 1));

@@ -2,6 +2,7 @@
 #include "motion/engine.h"
 #include "base/atomic.h"
 #include "base/inline.h"
+#include "drivers.h"
 #include "motion/block.h"
 #include "motion/profile.h"
 #include "motion/ramp.h"
@@ -122,7 +123,8 @@ static uint8_t direction_flags(const motion_command_t *c, bool turn)
 
 void engine_init(void)
 {
-    profile_basis(&basis, settings.steps_per_rev, settings.ustep, settings.slow_rpm);
+    profile_basis(&basis, settings.steps_per_rev, drivers_ustep(settings.driver_id, settings.ustep),
+                  settings.slow_rpm);
     engine.v_in_play = basis.v_slow;
     certain_centi = (130000000u >> basis.factor_log2) / basis.steps_per_rev;
     engine.width_ticks = (uint16_t)settings.pulse_us * TICKS_PER_US;

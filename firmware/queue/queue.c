@@ -2,6 +2,7 @@
 #include "base/inline.h"
 #include "eeprom/store.h"
 #include "motion/engine.h"
+#include "queue/encoder.h"
 #include "queue/session.h"
 #include "settings.h"
 #include <string.h>
@@ -264,6 +265,21 @@ void queue_follow(const motion_command_t *command)
         continuous->accel = command->accel;
         continuous->flags = (uint8_t)((continuous->flags & ~SESSION_FLAGS) | (command->flags & SESSION_FLAGS));
         queue_preempt(QUEUE_CONTINUOUS);
+    }
+}
+
+void queue_throttle(int8_t rpm)
+{
+    if (preempting != QUEUE_CONTINUOUS && !is_continuous()) {
+        return;
+    }
+    motion_command_t faster = entries[QUEUE_CONTINUOUS];
+    const uint32_t least = rpm < 0 ? 1u + (uint8_t)-rpm : 0;
+    const uint32_t before = command_rpm(&faster);
+    faster.velocity = before < least ? 1u : (uint32_t)((int32_t)before + rpm);
+    faster.flags &= (uint8_t)~MOTION_CYCLE;
+    if (engine_check(&faster) == STATUS_OK) {
+        queue_preempt_with(QUEUE_CONTINUOUS, &faster);
     }
 }
 

@@ -11,13 +11,42 @@
 #define REG_SMCR 0x53
 #define SMCR_SE 0x01
 #define OPCODE_RETI 0x9518
+#define OPCODE_RJMP_SELF 0xCFFF
 
 /* -- life ------------------------------------------------------------------------------------------------------------ */
+
+static uint16_t opcode_at(const avr_t *avr, uint32_t pc)
+{
+    return (uint16_t)(avr->flash[pc] | avr->flash[pc + 1] << 8);
+}
+
+static void put_opcode(avr_t *avr, uint32_t pc, uint16_t opcode)
+{
+    avr->flash[pc] = (uint8_t)opcode;
+    avr->flash[pc + 1] = (uint8_t)(opcode >> 8);
+}
+
+static void hang_ends(board_t *b)
+{
+    if (b->hangs)
+        put_opcode(b->avr, b->hangs_at, b->hangs_instead_of);
+    b->hangs = false;
+}
+
+void board_hang(board_t *b)
+{
+    hang_ends(b);
+    b->hangs = true;
+    b->hangs_at = b->avr->pc;
+    b->hangs_instead_of = opcode_at(b->avr, b->hangs_at);
+    put_opcode(b->avr, b->hangs_at, OPCODE_RJMP_SELF);
+}
 
 void cpu_reset(board_t *b)
 {
     avr_t *avr = b->avr;
 
+    hang_ends(b);
     memset(avr->data, 0, BOARD_RAM_START); /* working registers are undefined on the chip; 0 is repeatable */
     memset(avr->sreg, 0, sizeof avr->sreg);
     avr->interrupt_state = 0;
@@ -99,11 +128,6 @@ const char *board_crash(const board_t *b)
 }
 
 /* -- the processor loop -------------------------------------------------------------------------------------------- */
-
-static uint16_t opcode_at(const avr_t *avr, uint32_t pc)
-{
-    return (uint16_t)(avr->flash[pc] | avr->flash[pc + 1] << 8);
-}
 
 /* The stack pointer left the range seen so far. While OUT SPH and OUT SPL move it in two steps it may point anywhere:
  * only the second counts. avr-gcc writes SPH first, restores SREG between the two and never takes longer. */

@@ -46,6 +46,9 @@ board_run_t board_run_past(board_t *b, uint16_t byte_address, uint64_t limit_cyc
 /* Until cond(b, ctx) is true, asked after every instruction; keep it cheap. */
 board_run_t board_run_until(board_t *b, bool (*cond)(board_t *, void *), void *ctx, uint64_t limit_cycles);
 const char *board_crash(const board_t *b);
+/* The program hangs: the instruction that is due next jumps to itself, until the next reset. Interrupts are served if
+ * they are enabled there. */
+void board_hang(board_t *b);
 
 /* -- pins ------------------------------------------------------------------------------------------------------ */
 

@@ -187,6 +187,9 @@ struct board {
     avr_io_t instructions; /* hears simavr's requests for WDR and SPM */
     char crash[160];
     bool was_reset; /* cpu_reset() ran inside the running instruction */
+    bool hangs;     /* board_hang(): at this address, instead of this opcode */
+    uint32_t hangs_at;
+    uint16_t hangs_instead_of;
 
     /* time */
     uint64_t event_cycle[EVENT_SLOTS];

@@ -337,6 +337,7 @@ static void test_2400_rpm_at_full_step_are_reached(void)
 /* CLK-005 */
 static void test_a_cycle_with_a_fraction_of_a_tick_does_not_drift(void)
 {
+    settings.driver_id = 2;
     settings.ustep = 7;
     engine_init();
     motion_command_t c = cycle_move(20000, 3001, 999, 999); /* 375.125 ticks a pulse */

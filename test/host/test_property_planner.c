@@ -510,6 +510,7 @@ static void settle(void)
 static void check_played(const trial_t *t)
 {
     settings.steps_per_rev = (uint16_t)t->motor.steps_per_rev;
+    settings.driver_id = 2; /* has every factor */
     settings.ustep = t->factor_log2;
     settings.slow_rpm = (uint8_t)t->motor.slow_rpm;
     settings.pulse_us = PULSE_US;

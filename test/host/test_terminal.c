@@ -27,7 +27,7 @@ void setUp(void)
     queue_init();
     timebase_fake_us = 0;
     timebase_fake_step_us = 0;
-    terminal_init();
+    terminal_init(STATUS_OK);
     run();
     terminal_port_fake_clear();
 }
@@ -49,11 +49,23 @@ static const char *answer(const char *text)
 /* BOO-001, TRM-001 */
 static void test_the_version_line_stands_before_the_first_prompt(void)
 {
-    terminal_init();
+    terminal_init(STATUS_OK);
     const char *text = terminal_port_fake_text();
     TEST_ASSERT_EQUAL_STRING_LEN("SAC ", text, 4);
+    TEST_ASSERT_EQUAL_PTR(text + strlen(text) - 2, strstr(text, "\r\n"));
+    run();
+    text = terminal_port_fake_text();
     TEST_ASSERT_NOT_NULL(strstr(text, "\r\nSAC>"));
     TEST_ASSERT_EQUAL_STRING("\r\nSAC>", text + strlen(text) - 6);
+}
+
+/* What a reset left to say stands between them. */
+static void test_a_reset_is_reported_before_the_first_prompt(void)
+{
+    terminal_init(STATUS_WATCHDOG);
+    run();
+    TEST_ASSERT_NOT_NULL(strstr(terminal_port_fake_text(), "\r\n?17 reset: watchdog\r\nSAC>"));
+    TEST_ASSERT_EQUAL_STRING("m5\r\nSAC>", answer("m5\r"));
 }
 
 /* TRM-007 */
@@ -336,6 +348,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_the_version_line_stands_before_the_first_prompt);
+    RUN_TEST(test_a_reset_is_reported_before_the_first_prompt);
     RUN_TEST(test_a_motion_command_is_answered_by_its_echo_and_the_prompt_alone);
     RUN_TEST(test_each_kind_of_line_end_executes_once);
     RUN_TEST(test_the_motion_goes_to_the_engine_before_the_answer_is_queued);

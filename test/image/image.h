@@ -21,6 +21,7 @@
 
 #define CLK BOARD_PIN('B', 2)
 #define DIR BOARD_PIN('B', 5)
+#define RST BOARD_PIN('B', 0)
 #define OPSA BOARD_PIN('C', 5)
 #define OPSB BOARD_PIN('C', 2)
 #define TX_EN BOARD_PIN('D', 7)

@@ -283,7 +283,7 @@ static void test_sync_start_wait_direction_and_extra_pulses_are_forgotten(void)
     image_assert_no_pulse_for(50 * MS);
     image_do("y");
     image_idle(LONG_WAIT);
-    image_assert_pulses(45);
+    image_assert_pulses(40); /* truncated, the first one has no cruise for the 5 (STP-005) */
     image_assert_row(1, "1\t20\t CCW\t100\t3000\t 1.00\t1.00\t5\ts 500");
     image_assert_row(2, "2\t20\t CW\t100\t3000\t 1.00\t1.00\t0\t  0");
 }

@@ -109,6 +109,7 @@ static void test_500_random_commands_keep_count_bounds_and_sum(void)
         machine_t machine = {200, (unsigned)rand() % 8, 10};
         image_off();
         image_power_on();
+        IMAGE_SET(driver_id, 2); /* has every factor */
         IMAGE_SET(ustep, machine.ustep);
         IMAGE_SET(pulse_us, 1);
         image_prompt();

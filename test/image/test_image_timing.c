@@ -30,6 +30,7 @@ static void boot_with(unsigned ustep, unsigned pulse_us)
 {
     image_off();
     image_power_on();
+    IMAGE_SET(driver_id, 2); /* has every factor */
     IMAGE_SET(ustep, ustep);
     IMAGE_SET(pulse_us, pulse_us);
     image_prompt();

@@ -13,7 +13,7 @@ import { cases } from './cases.mjs';
 import { compare } from './compare.mjs';
 import { CPU_HZ, runWitness } from './witness.mjs';
 
-const FIRST_LINE_MS = 300; /* the prompt is out by then */
+const FIRST_LINE_MS = 1100; /* the prompt is out by then */
 const PROBE_CYCLES = 1_500_000;
 const PROBE_PULSE = 16;
 const CYCLES_PER_MS = CPU_HZ / 1000;

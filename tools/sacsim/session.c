@@ -26,7 +26,8 @@ enum {
     NOTICE_MS = 5000,      /* how long a notice stays in the status line */
     SAVE_MS = 2000,        /* host's time between two looks at the EEPROM */
     OPEN_RESET_MS = 50,    /* host's time from the opening of the port to the reset: programs flush first */
-    HELLO_QUIET_MS = 20,   /* simulated: the firmware has said hello when it then is quiet for so long */
+    HELLO_QUIET_MS = 20,   /* simulated: the firmware has said hello when it then is quiet for so long behind a prompt, */
+    WINDOW_QUIET_MS = 1200, /* or so long: a second passes before the prompt, in which it takes no more than its ring */
     HELLO_LIMIT_MS = 3000, /* simulated: and if it says nothing at all, piped input starts anyway */
     SYNC_MS = 1,           /* simulated: width of the pulse of Ctrl-] y */
     BITS_PER_BYTE = 10,
@@ -51,6 +52,7 @@ typedef struct {
     double cycles_per_byte;
     uint64_t line_free_cycle;   /* when all bytes sent to the board will have gone out */
     uint64_t last_output_cycle; /* of the board's serial port; 0: none yet */
+    uint8_t last_output;
     bool input_started, input_ended;
     bool estop_held, factory_held;
 
@@ -358,6 +360,7 @@ static void take_output(session_t *s)
 
     if (count > 0) {
         s->last_output_cycle = received[count - 1].end_cycle;
+        s->last_output = received[count - 1].byte;
     }
     for (size_t i = 0; i < count;) {
         size_t n = 0;
@@ -477,8 +480,9 @@ static void read_keys(session_t *s, uint64_t until)
 static bool said_hello(const session_t *s)
 {
     uint64_t cycle = board_cycle(s->board);
+    uint64_t quiet_ms = s->last_output == '>' ? HELLO_QUIET_MS : WINDOW_QUIET_MS;
 
-    return (s->last_output_cycle > 0 && cycle - s->last_output_cycle > HELLO_QUIET_MS * CYCLES_PER_MS) ||
+    return (s->last_output_cycle > 0 && cycle - s->last_output_cycle > quiet_ms * CYCLES_PER_MS) ||
            cycle > HELLO_LIMIT_MS * CYCLES_PER_MS;
 }
 

@@ -1,5 +1,6 @@
 #include "host/fakes/engine_fake.h"
 #include <string.h>
+#include "boot.h"
 #include "host/fakes/terminal_port_fake.h"
 #include "settings.h"
 
@@ -135,4 +136,9 @@ bool engine_gap(void)
 uint8_t engine_faults(void)
 {
     return engine_fake.faults;
+}
+
+void boot_restart(void)
+{
+    engine_fake.restarts++;
 }

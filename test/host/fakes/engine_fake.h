@@ -23,6 +23,7 @@ typedef struct {
     const motion_command_t *offered; /* and not begun */
     uint8_t begun;
     unsigned releases;
+    unsigned restarts; /* boot_restart(): in main.c, which the tests of the host do without */
     motion_command_t submitted[ENGINE_FAKE_COMMANDS];
     unsigned submitted_count;
     unsigned stops, nexts, nexts_graceful, stops_graceful;

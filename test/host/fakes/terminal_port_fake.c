@@ -95,3 +95,14 @@ void terminal_port_put(uint8_t byte)
     sent[sent_count++] = (char)byte;
     sent[sent_count] = '\0';
 }
+
+uint8_t terminal_port_peek(uint8_t others)
+{
+    assert(taken_count == 0 && others < typed_count);
+    return typed[others];
+}
+
+bool terminal_port_idle(void)
+{
+    return terminal_port_free() == PLACES;
+}
