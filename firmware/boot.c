@@ -7,8 +7,8 @@ enum { POWER_ON = 1 << 0, BROWN_OUT = 1 << 2, WATCHDOG = 1 << 3 };
 
 #define ESCAPE 0x1B
 #define ESCAPES 3
-/* 1.016 s; the version line is out 5 ms after their beginning. */
-#define WINDOW_WRAPS 31
+/* 1.049 s; the version line is out 5 ms after their beginning. */
+#define WINDOW_WRAPS 4
 
 static status_t cause;
 static bool open; /* the window */

@@ -2,8 +2,8 @@
  *
  * An interrupt that makes work for the main loop writes any value but 0 to wake_flag. The main loop clears it, polls
  * everything, and calls wake_sleep() when no poll found work: if the flag has been raised since, it returns at once.
- * The step interrupt need not, but when it ends: wake_sleep() returns after every step. The time base does not end it,
- * but raises the flag every 33 ms, so that the main loop can tell the watchdog that it is alive.
+ * The step interrupt need not, but when it ends: wake_sleep() returns after every step. The time base ends it
+ * every 33 ms only, so that the main loop can tell the watchdog that it is alive.
  * Shared:  wake_flag is written by interrupts (non-zero) and by the main loop (zero): a single byte.
  * Context: wake_sleep() in the main loop, with interrupts enabled. Errors: none.
  * Tests:   test/image (a command typed while the processor sleeps starts at once). */
@@ -14,6 +14,6 @@
 
 extern volatile uint8_t wake_flag;
 
-void wake_sleep(void); /* until wake_flag is raised, or any interrupt but the time base's */
+void wake_sleep(void); /* until wake_flag is raised, or any interrupt but most of the time base's */
 
 #endif

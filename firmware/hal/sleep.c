@@ -22,7 +22,8 @@ void wake_sleep(void)
             __asm__ volatile("sei\n\tsleep" : : : "memory");
         }
         sei();
-        /* Again, if it was the time base and no step. */
-    } while (wake_flag == 0 && timebase_low() != overflows && GPIOR0 == counted && step_tail == tail);
+        /* Again, if it was the time base and no step; not every 33 ms. */
+    } while (wake_flag == 0 && timebase_low() != overflows && (timebase_low() & 31) != 0 && GPIOR0 == counted &&
+             step_tail == tail);
     SMCR = 0;
 }

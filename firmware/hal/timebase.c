@@ -1,4 +1,4 @@
-/* Timer0 at clock / 8 (0.5 us), counted on by its overflow interrupt every 128 us (timebase_isr.S).
+/* Timer0 at clock / 64 (4 us), counted on by its overflow interrupt every 1.024 ms (timebase_isr.S).
  * It runs freely: who needs its compare units may rely on that.
  * Source: ATmega328P datasheet DS40002061, 15.7.1 (normal mode), 15.9. */
 #include <avr/io.h>
@@ -11,7 +11,7 @@ volatile uint32_t timebase_overflows;
 void timebase_start(void)
 {
     TIMSK0 = _BV(TOIE0);
-    TCCR0B = _BV(CS01);
+    TCCR0B = _BV(CS01) | _BV(CS00);
 }
 
 uint8_t timebase_wraps(void)
@@ -30,5 +30,5 @@ uint32_t timebase_us(void)
     if ((flags & _BV(TOV0)) != 0 && ticks < 128) {
         high++; /* overflowed, not yet counted */
     }
-    return (high << 7) | (ticks >> 1);
+    return (high << 8 | ticks) << 2;
 }

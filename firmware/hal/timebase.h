@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-extern volatile uint32_t timebase_overflows; /* written by the interrupt alone */
+extern volatile uint32_t timebase_overflows; /* every 1.024 ms; written by the interrupt alone */
 
 static inline uint8_t timebase_low(void)
 {

@@ -1,7 +1,7 @@
-; Counts the overflows of Timer0 for timebase.c, and lets the main loop look round every 256 of them (32.768 ms).
+; Counts the overflows of Timer0 for timebase.c.
 ;
-; Interruptible from its first instruction (9 cycles after the flag): the next overflow is 2,048 cycles away.
-; 29 cycles; 53 with a carry, and 8 for each further one.
+; Interruptible from its first instruction (9 cycles after the flag): the next overflow is 16,384 cycles away.
+; 29 cycles; 51 with a carry, and 8 for each further one.
 
 #include <avr/io.h>
 
@@ -23,7 +23,6 @@ TIMER0_OVF_vect:
     push r31
     ldi  r30, lo8(timebase_overflows + 1)
     ldi  r31, hi8(timebase_overflows + 1)
-    sts  wake_flag, r31         ; the high byte of an address in RAM is not 0
 carry:
     ld   r24, Z
     inc  r24
