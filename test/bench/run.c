@@ -81,7 +81,7 @@ void run_begin(run_t *run, setup_t setup)
     board_uart_baud(run->board, setup.baud);
     board_record(run->board, CLK, true);
     board_on_edge(run->board, on_edge, run);
-    run_for(run, TICKS_PER_S + TICKS_PER_S / 20); /* the window and the prompt */
+    run_for(run, TICKS_PER_S + TICKS_PER_S / 5); /* the window and the prompt */
     if (!strstr(board_uart_text(run->board), "SAC>"))
         die("no prompt: \"%s\"", board_uart_text(run->board));
     board_uart_clear(run->board);
