@@ -91,7 +91,7 @@ test_property_planner_SRCS := $(ENGINE_SRCS) test/host/motion_exact.c
 AVR_TESTS := test_number test_line test_session test_wide test_block test_ramp test_profile
 
 # Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
-IMAGE_TESTS := test_image_motion test_image_queue test_image_terminal test_image_stop test_image_timing test_image_stress
+IMAGE_TESTS := test_image_motion test_image_queue test_image_terminal test_image_stop test_image_timing test_image_stress test_image_estop
 # What every whole-image test is linked with.
 IMAGE_COMMON_SRCS := test/image/image.c test/image/model.c
 

@@ -5,6 +5,7 @@
 #include "cli/terminal.h"
 #include "cli/terminal_port.h"
 #include "motion/engine.h"
+#include "motion/estop_port.h"
 #include "pins_port.h"
 #include "queue/queue.h"
 #include "settings.h"
@@ -22,6 +23,9 @@ int main(void)
     for (;;) {
         /* Cleared before the polls: what an interrupt leaves to do meanwhile is seen in this round or the next. */
         wake_flag = 0;
+        if (estop_port_poll()) {
+            queue_stop();
+        }
         bool worked = terminal_poll(); /* first: a line's end is what wakes a unit at rest, and its motion is awaited */
         worked |= queue_poll();
         worked |= engine_poll();

@@ -29,8 +29,9 @@ void pins_init(void)
     DDRC = ddr_c;
     DDRD = ddr_d;
 
-    EICRA = 1 << ISC11; /* INT1, the sync pin: falling edges (section 13.2.1) */
-    EIMSK = 1 << INT1;
+    EICRA = 1 << ISC11 | 1 << ISC01; /* INT0, Estop, and INT1, sync: falling edges (section 13.2.1) */
+    EIFR = 1 << INTF0;
+    EIMSK = 1 << INT0;
 
     /* 1 MHz on OC2A from Timer2 alone: CTC, toggle every 8 cycles (datasheet section 18.7.2). */
     OCR2A = 7;

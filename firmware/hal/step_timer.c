@@ -4,6 +4,7 @@
  * share one TEMP byte, so the main loop touches them only with interrupts off or the timer stopped. */
 #include "base/atomic.h"
 #include "base/inline.h"
+#include "motion/estop_port.h"
 #include "motion/segment.h"
 #include "motion/step_port.h"
 #include <avr/interrupt.h>
@@ -58,7 +59,7 @@ void step_port_dir(bool level)
 }
 
 /* The timer stands ready: all but its clock. */
-void step_port_hold(void)
+static void make_ready(void)
 {
     step_port_init();
     set_compare(STEP_PORT_LEAD_TICKS + LEAD_BEGIN - 1, SEGMENT_SILENT);
@@ -83,30 +84,47 @@ void step_port_hold(void)
     TIMSK1 = 1 << TOIE1;
 }
 
-void step_port_start(void)
+/* The INT1 interrupt is enabled while the timer is held, the INT0 interrupt until Estop has struck. */
+void step_port_hold(void)
 {
-    step_port_hold();
-    TCCR1B = RUNNING;
+    make_ready();
+    EIFR = 1 << INTF1; /* an edge before this moment does not count */
+    uint8_t state = atomic_begin();
+    if (EIMSK & 1 << INT0)
+        EIMSK |= 1 << INT1;
+    atomic_end(state);
 }
 
-/* Held: ready, and nobody has given it a clock. */
-static inline void release(void)
+void step_port_start(void)
 {
-    if (TIMSK1 && TCCR1B == MODE15_B)
+    make_ready();
+    uint8_t state = atomic_begin();
+    if (EIMSK & 1 << INT0)
         TCCR1B = RUNNING;
+    atomic_end(state);
 }
 
 void step_port_release(void)
 {
     uint8_t state = atomic_begin();
-    release();
+    if (EIMSK & 1 << INT1) {
+        TCCR1B = RUNNING;
+        EIMSK &= (uint8_t)~(1 << INT1);
+    }
     atomic_end(state);
 }
 
-/* The sync pin has fallen. */
-ISR(INT1_vect)
+bool estop_port_active(void)
 {
-    release();
+    return !(EIMSK & 1 << INT0) || !(PIND & 1 << 2);
+}
+
+bool estop_port_poll(void)
+{
+    bool active = estop_port_active();
+    if (active && PIND & 1 << 2) /* not one that strikes just now */
+        EIMSK |= 1 << INT0;
+    return active;
 }
 
 step_snapshot_t step_port_snapshot(void)
@@ -145,6 +163,7 @@ void step_port_halt(void)
         cli();
         if (TCCR1B == MODE15_B) {
             TIMSK1 = 0; /* it is held */
+            EIMSK &= (uint8_t)~(1 << INT1);
             sei();
             return;
         }
@@ -152,7 +171,8 @@ void step_port_halt(void)
             if (fast) {
                 /* A pulse is due or there, and over in a moment: freeze right behind it. */
                 while (!(TIFR1 & 1 << TOV1))
-                    ;
+                    if (EIFR & 1 << INTF0)
+                        goto let_pass; /* it knows better */
                 TCCR1B = MODE15_B;
                 TIMSK1 = 0;
                 sei();
@@ -170,17 +190,18 @@ void step_port_halt(void)
                 return;
             }
         }
-        /* A pulse is due or there: let it pass. */
+    let_pass: /* a pulse is due or there, or Estop */
         sei();
         __asm__ __volatile__("nop\n\tnop");
     }
+    while (PINB & 1 << 2)
+        ; /* Estop's last pulse */
     TCCR1B = MODE15_B;
-    TIFR1 = 1 << TOV1;
 }
 
 void step_port_finish(void)
 {
-    while (!step_idle || !(TIFR1 & 1 << TOV1))
+    while (TIMSK1 || (TCCR1B == RUNNING && !(TIFR1 & 1 << TOV1)))
         ;
 }
 
@@ -192,7 +213,7 @@ bool step_port_arm(uint8_t offset, uint16_t top, uint16_t match, uint8_t flags)
     uint8_t state = atomic_begin();
     uint8_t distance = (uint8_t)(after - step_tail);
     bool done = distance != 0 && distance <= (uint8_t)(step_head - step_tail);
-    if (before_top >= ARM_LEAST_TICKS && distance == 0 && !step_idle && !(TIFR1 & 1 << TOV1) &&
+    if (before_top >= ARM_LEAST_TICKS && distance == 0 && TIMSK1 && !(TIFR1 & 1 << TOV1) &&
         (uint16_t)(TCNT1 + ARM_TICKS) < before_top) {
         /* Loaded, but the period before it is still running: into the buffers. */
         set_compare(top, match);

@@ -1,7 +1,6 @@
 /* USART0 as the terminal's port: rings between the main loop and the interrupts of usart_isr.S.
  * Source: ATmega328P datasheet DS40002061, section 20. */
 #include <avr/io.h>
-#include "base/atomic.h"
 #include "cli/terminal_port.h"
 #include "hal/baud.h"
 #include "hal/usart.h"
@@ -18,7 +17,7 @@ void terminal_port_init(uint32_t baud)
     UCSR0A = divisor.u2x ? (uint8_t)_BV(U2X0) : 0;
     UBRR0 = divisor.ubrr;
     UCSR0C = _BV(UCSZ01) | _BV(UCSZ00); /* 8 data bits, no parity, 1 stop bit */
-    UCSR0B = _BV(RXCIE0) | _BV(RXEN0) | _BV(TXEN0);
+    UCSR0B = USART_CONTROL | _BV(RXCIE0);
 }
 
 int16_t terminal_port_get(void)
@@ -49,8 +48,5 @@ void terminal_port_put(uint8_t byte)
     const uint8_t head = usart_tx_head;
     usart_tx_bytes[head] = byte;
     usart_tx_head = (uint8_t)((head + 1) & (USART_TX_BYTES - 1));
-    /* The interrupts write UCSR0B too: 7 cycles masked. */
-    const uint8_t state = atomic_begin();
-    UCSR0B |= _BV(UDRIE0);
-    atomic_end(state);
+    UCSR0B = USART_CONTROL | _BV(RXCIE0) | _BV(UDRIE0);
 }

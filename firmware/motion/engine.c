@@ -3,6 +3,7 @@
 #include "base/atomic.h"
 #include "base/inline.h"
 #include "motion/block.h"
+#include "motion/estop_port.h"
 #include "motion/profile.h"
 #include "motion/ramp.h"
 #include "motion/segment.h"
@@ -314,12 +315,13 @@ int32_t engine_position(void)
     const segment_t *loaded = segment_at(loaded_offset);
     const segment_t *running = loaded;
     uint16_t counted = counted_periods(loaded);
-    if (at.to_count == counted)
-        running = segment_at((uint8_t)(loaded_offset - SEGMENT_BYTES));
     int32_t to_come = pulses_from(at.tail);
-    if (!step_idle)
+    if (!step_idle) { /* otherwise its last period is running, or over */
+        if (at.to_count == counted)
+            running = segment_at((uint8_t)(loaded_offset - SEGMENT_BYTES));
         to_come += signed_pulses(loaded, (uint16_t)(at.to_count + early_periods(loaded->flags)));
-    if (!at.pulse_high && !at.period_over && !step_idle)
+    }
+    if (!at.pulse_high && !at.period_over)
         to_come += signed_pulses(running, 1);
     return emitted - to_come;
 }
@@ -1151,6 +1153,8 @@ void engine_single_pulse(bool ccw)
     } else if (running() || next) {
         return;
     }
+    if (estop_port_active())
+        return;
     begin_ring();
     stage = STAGE_REST;
     single = true;
