@@ -42,6 +42,7 @@ FIRMWARE_SRCS := \
     firmware/motion/profile.c \
     firmware/motion/engine.c \
     firmware/queue/queue.c \
+    firmware/queue/ops.c \
     firmware/queue/session.c \
     firmware/cli/commands.c \
     firmware/cli/display.c \
@@ -61,16 +62,17 @@ FIRMWARE_SRCS := \
 # Host tests: test/host/<name>.c, one binary a module, with the sources that <name>_SRCS lists; <name>_HOST_SRCS are
 # needed on the host alone, and assembler on the AVR alone.
 
-HOST_TESTS := test_number test_status test_baud test_line test_session test_queue test_motion_syntax test_commands \
+HOST_TESTS := test_number test_status test_baud test_line test_session test_queue test_ops test_motion_syntax test_commands \
     test_display test_terminal test_wide test_block test_ramp test_profile test_engine test_property_planner
 FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 CLI_SRCS := firmware/cli/commands.c firmware/cli/display.c firmware/cli/text.c firmware/cli/motion_syntax.c \
-    firmware/base/number.c firmware/queue/queue.c firmware/queue/session.c firmware/settings.c $(FAKE_SRCS)
+    firmware/base/number.c firmware/queue/queue.c firmware/queue/ops.c firmware/queue/session.c firmware/settings.c $(FAKE_SRCS)
 test_number_SRCS := firmware/base/number.c
 test_status_SRCS := firmware/base/status.c
 test_line_SRCS := firmware/cli/line.c
 test_session_SRCS := firmware/queue/session.c firmware/settings.c
 test_queue_SRCS := firmware/queue/queue.c firmware/queue/session.c firmware/settings.c $(FAKE_SRCS)
+test_ops_SRCS := firmware/queue/ops.c firmware/settings.c $(FAKE_SRCS)
 test_motion_syntax_SRCS := firmware/cli/motion_syntax.c firmware/base/number.c firmware/queue/session.c \
     firmware/settings.c $(FAKE_SRCS)
 test_commands_SRCS := $(CLI_SRCS)
@@ -91,7 +93,8 @@ test_property_planner_SRCS := $(ENGINE_SRCS) test/host/motion_exact.c
 AVR_TESTS := test_number test_line test_session test_wide test_block test_ramp test_profile
 
 # Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
-IMAGE_TESTS := test_image_motion test_image_queue test_image_terminal test_image_stop test_image_timing test_image_stress test_image_estop
+IMAGE_TESTS := test_image_motion test_image_queue test_image_terminal test_image_stop test_image_timing test_image_stress \
+    test_image_estop test_image_ops
 # What every whole-image test is linked with.
 IMAGE_COMMON_SRCS := test/image/image.c test/image/model.c
 

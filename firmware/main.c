@@ -7,6 +7,7 @@
 #include "motion/engine.h"
 #include "motion/estop_port.h"
 #include "pins_port.h"
+#include "queue/ops.h"
 #include "queue/queue.h"
 #include "settings.h"
 
@@ -29,6 +30,7 @@ int main(void)
         bool worked = terminal_poll(); /* first: a line's end is what wakes a unit at rest, and its motion is awaited */
         worked |= queue_poll();
         worked |= engine_poll();
+        ops_poll();
         if (!worked) {
             wake_sleep();
         }

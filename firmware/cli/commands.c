@@ -5,6 +5,7 @@
 #include "cli/motion_syntax.h"
 #include "cli/timebase_port.h"
 #include "motion/engine.h"
+#include "queue/ops.h"
 #include "queue/queue.h"
 #include "queue/session.h"
 
@@ -146,11 +147,12 @@ static status_t command_debug(const char *rest)
     return STATUS_OK;
 }
 
-static status_t command_ramp(const char *rest)
+/* 0 or 1; neither: no change (A-SYS-02). */
+static status_t take_flag(const char *rest, void (*set)(bool on))
 {
     static const char range_flag[] FLASH = "0..1";
     if (is_end(rest[0])) {
-        return STATUS_OK; /* neither 0 nor 1: no change (A-SYS-02) */
+        return STATUS_OK;
     }
     if (rest[0] < '0' || rest[0] > '9') {
         return STATUS_SYNTAX;
@@ -159,7 +161,24 @@ static status_t command_ramp(const char *rest)
         refused_range = range_flag;
         return STATUS_RANGE;
     }
-    session_set_linear(rest[0] == '1');
+    set(rest[0] == '1');
+    return STATUS_OK;
+}
+
+static status_t command_ramp(const char *rest)
+{
+    return take_flag(rest, session_set_linear);
+}
+
+static status_t command_soft_ops(const char *rest)
+{
+    return take_flag(rest, ops_set_soft);
+}
+
+static status_t command_release(const char *rest)
+{
+    (void)rest;
+    engine_release();
     return STATUS_OK;
 }
 

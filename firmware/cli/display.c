@@ -4,6 +4,7 @@
 #include "cli/terminal_port.h"
 #include "cli/text.h"
 #include "motion/engine.h"
+#include "queue/ops.h"
 #include "queue/queue.h"
 #include "queue/session.h"
 
@@ -15,10 +16,11 @@ static const char *text; /* in flash: what is still to come of the present text;
 static uint8_t ruled;    /* how many signs of a rule have been printed */
 static uint8_t row;      /* of the queue; then what follows its rows */
 
-/* What `cf` shows: as it was when the display began, and whether GAP testing was on. */
+/* What `cf` shows: as it was when the display began, and whether GAP testing and soft ops were on. */
 static session_t shown_session;
 #define SHOWN_GAP (1u << 5)
-_Static_assert((SHOWN_GAP & SESSION_FLAGS) == 0, "a flag of its own");
+#define SHOWN_SOFT MOTION_SYNC
+_Static_assert(((SHOWN_GAP | SHOWN_SOFT) & SESSION_FLAGS) == 0, "flags of their own");
 
 /* -- the texts -------------------------------------------------------------------------------------------------------- */
 
@@ -87,7 +89,7 @@ static const char defaults_text[] FLASH =
     "v " RPM " cycle " CYCLE "\r\n"
     "a " ACCEL " d " DECEL " " CHOICE(LINEAR, "linear", "harmonic") "\r\n"
     "GAP " CHOICE(GAP, "on", "off") ", " CHOICE(PULSES, "pulses", "full step") ", EnF\r\n"
-    "ops 36, soft_ops off, CRC 1, ACK on\r\n";
+    "ops 36, soft_ops " CHOICE(SYNC, "on", "off") ", CRC 1, ACK on\r\n";
 /* clang-format on */
 
 static const char velocity_text[] FLASH = VELOCITY "\r\n";
@@ -165,6 +167,9 @@ static void begin(uint8_t display)
     shown_session = session;
     if (engine_gap()) {
         shown_session.flags |= SHOWN_GAP;
+    }
+    if (ops_soft()) {
+        shown_session.flags |= SHOWN_SOFT;
     }
 }
 

@@ -1,6 +1,7 @@
 /* Directions, pull-ups and idle levels of all posts, from the table in board.h. */
 #include "board.h"
 #include "pins_port.h"
+#include "queue/ops_port.h"
 #include <avr/io.h>
 
 
@@ -37,4 +38,16 @@ void pins_init(void)
     OCR2A = 7;
     TCCR2A = 1 << COM2A0 | 1 << WGM21;
     TCCR2B = 1 << CS20;
+}
+
+void ops_port_set(bool executing)
+{
+    /* Single-bit instructions: no other bit of the port is touched. */
+    if (executing) {
+        PORTC &= (uint8_t)~(1 << 2);
+        PORTC |= 1 << 5;
+    } else {
+        PORTC &= (uint8_t)~(1 << 5);
+        PORTC |= 1 << 2;
+    }
 }

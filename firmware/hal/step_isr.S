@@ -48,7 +48,7 @@ motion_state: .skip 1
         sts     OCR1BL, r24
 .endm
 
-/* Estop may not wait for the end of this interrupt: no clock, and its own interrupt comes next. r24 is free. */
+/* Estop may not wait for the end of this interrupt: no clock, and its own interrupt comes next. */
 .macro look_for_estop
         sbic    io(EIFR), INTF0
         rcall   stop_clock
@@ -143,6 +143,7 @@ early:
         lds     r31, step_head
         cp      r31, r30
         breq    near_early_empty
+        look_for_estop
         ldi     r31, hi8(segments)
         cpi     r24, 1 << SEGMENT_EARLY_SHIFT
         breq    load
@@ -159,16 +160,17 @@ early:
         rjmp    2b
 3:
         buffers
+        sbic    io(TIFR1), TOV1
+        rcall   late
         look_for_estop
-        sbis    io(TIFR1), TOV1
-        rjmp    leave
-        ldi     r24, 1
-        sts     step_late, r24
         rjmp    leave
 load_late:
+        rcall   late
+        rjmp    loaded
+late:
         ldi     r24, 1
         sts     step_late, r24
-        rjmp    loaded
+        ret
 near_early_empty:
         rjmp    early_empty
 
@@ -181,8 +183,10 @@ set_dir:
         ret
 
 stop_clock:
+        push    r24
         ldi     r24, MODE15_STOPPED
         sts     TCCR1B, r24
+        pop     r24
         ret
 
         /* Estop while periods are waited for: those still due are left to be counted as usual. */

@@ -160,6 +160,11 @@ void step_port_halt(void)
         const segment_t *loaded = segment_at((uint8_t)(tail - SEGMENT_BYTES));
         const segment_t *before = segment_at((uint8_t)(tail - 2 * SEGMENT_BYTES));
         bool fast = loaded->top < SEGMENT_EARLY1_BELOW_TICKS || before->top < SEGMENT_EARLY1_BELOW_TICKS;
+        uint8_t low = GPIOR0;
+        const segment_t *s = loaded;
+        if (low == s->count_low && GPIOR1 == s->count_high)
+            s = before; /* its last period is running */
+        uint16_t match = s->match;
         cli();
         if (TCCR1B == MODE15_B) {
             TIMSK1 = 0; /* it is held */
@@ -167,7 +172,7 @@ void step_port_halt(void)
             sei();
             return;
         }
-        if (tail == step_tail && !(TIFR1 & 1 << TOV1)) {
+        if (tail == step_tail && low == GPIOR0 && !(TIFR1 & 1 << TOV1)) {
             if (fast) {
                 /* A pulse is due or there, and over in a moment: freeze right behind it. */
                 while (!(TIFR1 & 1 << TOV1))
@@ -178,10 +183,6 @@ void step_port_halt(void)
                 sei();
                 return;
             }
-            const segment_t *s = loaded;
-            if (GPIOR0 == s->count_low && GPIOR1 == s->count_high)
-                s = before; /* its last period is running */
-            uint16_t match = s->match;
             uint16_t now = TCNT1;
             if (match == SEGMENT_SILENT || (uint16_t)(now + FREEZE_TICKS) < match) {
                 TCCR1B = MODE15_B; /* no clock: nothing moves from here on */
@@ -208,13 +209,18 @@ void step_port_finish(void)
 bool step_port_arm(uint8_t offset, uint16_t top, uint16_t match, uint8_t flags)
 {
     segment_t *s = segment_at(offset);
-    uint16_t before_top = segment_at((uint8_t)(offset - SEGMENT_BYTES))->top;
+    const segment_t *before = segment_at((uint8_t)(offset - SEGMENT_BYTES));
+    uint16_t rise = before->top; /* or the end, if it is silent: Estop must not wait for this either */
+    if (before->match < rise)
+        rise = before->match;
     uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
+    uint8_t head = step_head;
+    bool done = false;
     uint8_t state = atomic_begin();
-    uint8_t distance = (uint8_t)(after - step_tail);
-    bool done = distance != 0 && distance <= (uint8_t)(step_head - step_tail);
-    if (before_top >= ARM_LEAST_TICKS && distance == 0 && TIMSK1 && !(TIFR1 & 1 << TOV1) &&
-        (uint16_t)(TCNT1 + ARM_TICKS) < before_top) {
+    uint8_t tail = step_tail;
+    if (tail != after) {
+        done = (uint8_t)(after - tail) <= (uint8_t)(head - tail);
+    } else if (rise >= ARM_LEAST_TICKS && TIMSK1 && !(TIFR1 & 1 << TOV1) && (uint16_t)(TCNT1 + ARM_TICKS) < rise) {
         /* Loaded, but the period before it is still running: into the buffers. */
         set_compare(top, match);
         step_flags = flags;
@@ -234,18 +240,19 @@ bool step_port_extend(uint8_t offset)
 {
     segment_t *s = segment_at(offset);
     uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
+    uint8_t head = step_head;
     uint16_t extended = (uint16_t)(less_one(s->count_low, s->count_high) + 1);
     bool done = false;
 
     uint8_t state = atomic_begin();
-    uint8_t distance = (uint8_t)(after - step_tail);
-    if (distance == 0) {
+    uint8_t tail = step_tail;
+    if (tail == after) {
         uint8_t low = GPIOR0;
         if (low >= 16 && low != 255) {
             GPIOR0 = (uint8_t)(low + 1);
             done = true;
         }
-    } else if (distance <= (uint8_t)(step_head - step_tail)) {
+    } else if ((uint8_t)(after - tail) <= (uint8_t)(head - tail)) {
         set_less_one(s, extended); /* here already: the interrupt may be about to load it */
         done = true;
     }
@@ -260,9 +267,11 @@ bool step_port_extend(uint8_t offset)
 bool step_port_drop_after(uint8_t offset)
 {
     uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
+    uint8_t head = step_head;
     bool done = false;
     uint8_t state = atomic_begin();
-    if ((uint8_t)(after - step_tail) <= (uint8_t)(step_head - step_tail)) {
+    uint8_t tail = step_tail;
+    if ((uint8_t)(after - tail) <= (uint8_t)(head - tail)) {
         step_head = after;
         done = true;
     }

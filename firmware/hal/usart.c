@@ -4,6 +4,7 @@
 #include "cli/terminal_port.h"
 #include "hal/baud.h"
 #include "hal/usart.h"
+#include "queue/ops_port.h"
 
 _Static_assert(TERMINAL_PORT_DAMAGED == USART_DAMAGED, "the terminal knows a damaged byte by this value");
 
@@ -49,4 +50,11 @@ void terminal_port_put(uint8_t byte)
     usart_tx_bytes[head] = byte;
     usart_tx_head = (uint8_t)((head + 1) & (USART_TX_BYTES - 1));
     UCSR0B = USART_CONTROL | _BV(RXCIE0) | _BV(UDRIE0);
+}
+
+void ops_port_send(uint8_t byte)
+{
+    if (terminal_port_free() != 0) {
+        terminal_port_put(byte);
+    }
 }

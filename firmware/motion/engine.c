@@ -71,7 +71,7 @@ static bool tail_fast;           /* too fast for a tail: a following command len
 static uint8_t last_run_offset;
 
 static int32_t emitted; /* position, in pulses, when all that is in the ring has been played */
-static uint8_t begun, ended;   /* commands, modulo 256 */
+static uint8_t begun, ended, played; /* commands, modulo 256 */
 static bool endless;           /* the command goes on until it is cut */
 static uint8_t faults;
 static uint32_t certain_centi; /* steepest linear ramp whose first interval is longer than AHEAD_LONG_TICKS */
@@ -181,11 +181,13 @@ static void look_for_end(void)
 {
     if (joined && has_begun(joined_offset)) {
         ended = (uint8_t)(ended + joined);
+        played = (uint8_t)(played + joined);
         joined = 0;
     }
     if (tail_awaited && has_begun(tail_offset)) {
         tail_awaited = false;
         ended++;
+        played++;
     }
 }
 
@@ -1012,6 +1014,11 @@ uint8_t engine_commands_ended(void)
     return ended;
 }
 
+uint8_t engine_commands_played(void)
+{
+    return played;
+}
+
 /* A command has been begun (its start wait included) and has not ended. */
 static bool running(void)
 {
@@ -1035,8 +1042,11 @@ static void halt(void)
     if (!playing)
         return;
     step_port_halt();
-    if (running())
+    if (running()) {
         ended++;
+        if (motion_state != MOTION_STANDBY)
+            played++;
+    }
     emitted = engine_position();
     playing = false;
     drop_emission();

@@ -36,6 +36,7 @@ bool engine_poll(void);
 
 /* Number of commands ended (completed or cut short) since boot, modulo 256. */
 uint8_t engine_commands_ended(void);
+uint8_t engine_commands_played(void); /* of these, all but those stopped before their first pulse; modulo 256 */
 
 void engine_stop(void);                                     /* S: no further pulse; everything taken is dropped */
 void engine_stop_graceful(accel_code_t decel, bool linear); /* s: ramp down from the present speed, drop the rest */

@@ -1,6 +1,7 @@
 #include "queue/queue.h"
 #include "base/inline.h"
 #include "motion/engine.h"
+#include "motion/estop_port.h"
 #include "queue/session.h"
 #include "settings.h"
 #include <string.h>
@@ -172,6 +173,9 @@ static void write(uint8_t position, const motion_command_t *command, bool added)
 status_t queue_add(const motion_command_t *command)
 {
     (void)note_begun();
+    if (estop_port_active()) {
+        return STATUS_ESTOP;
+    }
     if (pending == QUEUE_LAST) {
         return STATUS_QUEUE_FULL;
     }
@@ -208,18 +212,22 @@ status_t queue_undo(void)
 
 /* -- preemption -------------------------------------------------------------------------------------------------- */
 
-void queue_preempt(uint8_t position)
+status_t queue_preempt(uint8_t position)
 {
     (void)note_begun();
+    if (estop_port_active()) {
+        return STATUS_ESTOP;
+    }
     preempting = position;
     due = engine_next;
     (void)queue_poll();
+    return STATUS_OK;
 }
 
-void queue_preempt_with(uint8_t position, const motion_command_t *command)
+status_t queue_preempt_with(uint8_t position, const motion_command_t *command)
 {
     entries[position] = *command;
-    queue_preempt(position);
+    return queue_preempt(position);
 }
 
 static bool is_continuous(void)
@@ -235,19 +243,23 @@ void queue_follow(const motion_command_t *command)
         continuous->velocity = command->velocity;
         continuous->accel = command->accel;
         continuous->flags = (uint8_t)((continuous->flags & ~SESSION_FLAGS) | (command->flags & SESSION_FLAGS));
-        queue_preempt(QUEUE_CONTINUOUS);
+        (void)queue_preempt(QUEUE_CONTINUOUS);
     }
 }
 
 /* -- loops ------------------------------------------------------------------------------------------------------- */
 
-static void begin_run(run_t what, uint8_t first)
+static status_t begin_run(run_t what, uint8_t first)
 {
     (void)note_begun();
+    if (estop_port_active()) {
+        return STATUS_ESTOP;
+    }
     run = what;
     at = first;
     last_of_loop = false;
     (void)offer();
+    return STATUS_OK;
 }
 
 status_t queue_loop_bound(queue_bound_t bound, uint8_t position)
@@ -257,7 +269,7 @@ status_t queue_loop_bound(queue_bound_t bound, uint8_t position)
     }
     bounds[bound] = position;
     if (bounds[1 - bound] != 0 && run != RUN_LOOP) {
-        begin_run(RUN_LOOP, bounds[QUEUE_LOOP_START]);
+        return begin_run(RUN_LOOP, bounds[QUEUE_LOOP_START]);
     }
     return STATUS_OK;
 }
@@ -266,7 +278,7 @@ void queue_loop_from_first(uint8_t finish)
 {
     bounds[QUEUE_LOOP_START] = QUEUE_FIRST;
     bounds[QUEUE_LOOP_FINISH] = finish;
-    begin_run(RUN_LOOP, QUEUE_FIRST);
+    (void)begin_run(RUN_LOOP, QUEUE_FIRST);
 }
 
 void queue_loop_passes(uint16_t count)
@@ -293,8 +305,7 @@ status_t queue_array_run(uint16_t count)
     }
     end_loop();
     passes = count;
-    begin_run(RUN_ARRAY, 0);
-    return STATUS_OK;
+    return begin_run(RUN_ARRAY, 0);
 }
 
 void queue_loop_end(void)

@@ -5,7 +5,7 @@
  * in this order: the command that preempts, the next one of the loop or of the xRef array, the oldest pending one. It is
  * offered to the engine, which takes its values when it plans it: until then edits reach it.
  * Context: main loop.
- * Errors:  a status; nothing is changed then.
+ * Errors:  a status; nothing is changed then. While Estop is active what would begin motion is refused (STATUS_ESTOP).
  * Tests:   test/host/test_queue.c, test/image/test_image_processor.c
  * Source:  manual lines 271, 302-371, 485, 553-610, 959; decisions, sections 4 and 5. */
 #ifndef QUEUE_QUEUE_H
@@ -43,8 +43,8 @@ status_t queue_undo(void);
 
 /* Ends the running command at once, as N, and executes `position`; loop and queue go on with what would have come next.
  * 1..30, or QUEUE_CONTINUOUS or QUEUE_ONE_SHOT with the command that it holds from then on. */
-void queue_preempt(uint8_t position);
-void queue_preempt_with(uint8_t position, const motion_command_t *command);
+status_t queue_preempt(uint8_t position);
+status_t queue_preempt_with(uint8_t position, const motion_command_t *command);
 
 /* While the continuous command runs, it goes on with this velocity and acceleration; otherwise nothing. */
 void queue_follow(const motion_command_t *command);

@@ -96,7 +96,7 @@ static int64_t worst_of(const char *name, unsigned phases, unsigned how, uint64_
         }
     }
     munmap(seen, phases * sizeof *seen);
-    printf("Estop to last rise, %s: %lld cycles (phase %u of %u)\n", name, (long long)worst, at, phases);
+    printf("Estop to last rise, %s: \t%lld cycles (phase %u of %u)\n", name, (long long)worst, at, phases);
     return worst;
 }
 

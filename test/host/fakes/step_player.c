@@ -1,4 +1,5 @@
 #include "host/fakes/step_player.h"
+#include "motion/estop_port.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -603,4 +604,9 @@ uint16_t step_port_shorten(uint8_t offset, uint16_t periods)
         p.to_count = periods;
     }
     return (uint16_t)dropped;
+}
+
+bool estop_port_active(void)
+{
+    return false;
 }
