@@ -602,13 +602,16 @@ static bool emit_other(void)
     case STAGE_REST:
         return false;
     case STAGE_LEAD: {
-        /* The start wait, then the first pulse. */
+        /* The start wait, then the first pulse: in a short period of its own, because the state changes when it begins. */
         uint32_t us = command.start_wait_us;
-        uint32_t chunks = us >> (PROFILE_CHUNK_LOG2 - 4);
-        uint32_t ticks = (us & (PROFILE_CHUNK_TICKS / TICKS_PER_US - 1)) * TICKS_PER_US;
+        command.start_wait_us = 0;
         ramp_state = MOTION_STANDBY;
-        set_interval(chunks, ticks + DIR_SETUP_TICKS + width_ticks, true);
-        stage = STAGE_RUN;
+        if (us) {
+            set_interval(us >> (PROFILE_CHUNK_LOG2 - 4), (us & (PROFILE_CHUNK_TICKS / TICKS_PER_US - 1)) * TICKS_PER_US, false);
+        } else {
+            push(1, (uint16_t)(DIR_SETUP_TICKS + width_ticks - 1), true, MOTION_STANDBY);
+            stage = STAGE_RUN;
+        }
         return true;
     }
     case STAGE_RUN: {
@@ -813,28 +816,37 @@ static void start_now(void)
     uint16_t certain = certain_ticks();
     uint16_t cruised = 0;
     if (command.start_wait_us < 3072u) {
-        uint16_t lead = (uint16_t)(command.start_wait_us * TICKS_PER_US);
-        lead = (uint16_t)(lead + DIR_SETUP_TICKS + width_ticks);
-        append(1, (uint16_t)(lead - 1), width_ticks, flags);
+        uint16_t wait = (uint16_t)(command.start_wait_us * TICKS_PER_US);
+        uint16_t lead = (uint16_t)(DIR_SETUP_TICKS + width_ticks);
+        uint8_t first_flags = flags;
+        if (certain)
+            flags = (uint8_t)(flags | (command.accel == ACCEL_NONE ? MOTION_CRUISE : MOTION_ACCEL));
+        if (wait >= SHORTEST_PIECE_TICKS) {
+            append_silence(1, (uint16_t)(wait - 1), first_flags);
+        } else {
+            lead = (uint16_t)(lead + wait);
+            first_flags = flags; /* known at once, not only when the pulse is over */
+        }
+        append(1, (uint16_t)(lead - 1), width_ticks, first_flags);
         add_pulses(flags, 1);
         stage = STAGE_RUN;
         if (certain) {
-            flags = (uint8_t)(flags | (command.accel == ACCEL_NONE ? MOTION_CRUISE : MOTION_ACCEL));
             append_silence(AHEAD_PERIODS, (uint16_t)(certain / AHEAD_PERIODS - 1), flags);
             ahead_ticks = certain;
             play();
+            engine_on_start();
         } else if ((cruised = begin_cruise()) != 0) {
             play();
         }
     } else {
         stage = STAGE_LEAD;
-        emit(); /* sets the interval up, then its silence, then the pulse */
-        emit();
-        emit();
+        for (uint8_t steps = 4; steps > 0; steps--)
+            emit(); /* sets the interval up, then its silence, then the pulse */
         if (!(command.flags & MOTION_SYNC))
             play();
     }
     plan();
+    engine_on_start();
     profile.cruise_pulses -= cruised;
     fill();
     if (!playing)

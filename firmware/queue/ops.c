@@ -38,6 +38,11 @@ void ops_poll(void)
     }
 }
 
+void engine_on_start(void)
+{
+    ops_poll();
+}
+
 void ops_set_soft(bool on)
 {
     soft = on;

@@ -257,6 +257,145 @@ static void test_no_pulse_begins_3_us_after_estop_at_starts_joins_and_stops(void
     TEST_ASSERT_EQUAL_MESSAGE(0, over, "states that take longer than 3 us");
 }
 
+/* -- holding, refusing ------------------------------------------------------------------------------------------- */
+
+/* EST-001, EST-002, PIN-011 */
+static void test_while_estop_is_low_motion_is_refused_and_nothing_restarts_afterwards(void)
+{
+    boot(38400, 0, 2);
+    image_do("m2000v100a1d1");
+    image_do("m300");
+    image_run(SECOND);
+    image_send("m10"); /* in the middle of a line */
+    board_pin_drive(board, ESTOP, 0);
+    image_run(50 * MS);
+    TEST_ASSERT_EQUAL(STANDBY, image_peek("motion_state"));
+    image_assert_no_pulse_for(SECOND);
+    image_send("\r");
+    image_run(50 * MS);
+    image_assert_holds(image_take_text(), "?15 Estop");
+    image_refused("m100v100", "?15 Estop");
+    image_send("++-");
+    image_do("v200"); /* what is no motion is accepted */
+    image_do("N");
+    image_do("y");
+    image_assert_no_pulse_for(SECOND);
+    image_assert_row(1, "1\t2000\t CW\t100\t3000\t 1.00\t1.00\t0\t  0");
+    board_pin_drive(board, ESTOP, 1);
+    image_assert_no_pulse_for(5 * SECOND);
+    TEST_ASSERT_EQUAL(train.position, image_position());
+    image_train_clear();
+    image_do("m100v100a1d1");
+    image_idle(LONG_WAIT);
+    image_assert_pulses(100);
+}
+
+/* EST-001 */
+static void test_estop_that_is_low_at_boot_is_active(void)
+{
+    image_power_on();
+    board_pin_drive(board, ESTOP, 0);
+    image_prompt();
+    image_refused("m100v100", "?15 Estop");
+    board_pin_drive(board, ESTOP, 1);
+    image_do("m10v100a1d1");
+    image_idle(LONG_WAIT);
+    image_assert_pulses(10);
+}
+
+/* EST-001, SWT-007 */
+static void test_estop_ends_a_start_wait_and_a_sync_hold(void)
+{
+    static const char *const lines[] = {"m100t500000v100", "m100sv100"};
+    boot(38400, 0, 2);
+    for (size_t i = 0; i < 2; i++) {
+        image_do(lines[i]);
+        image_run(100 * MS);
+        board_pin_drive(board, ESTOP, 0);
+        image_run(US);
+        board_pin_drive(board, ESTOP, 1);
+        image_run(MS);
+        board_pin_drive(board, SYNC, 0);
+        image_run(MS);
+        board_pin_drive(board, SYNC, 1);
+        image_do("y");
+        image_assert_no_pulse_for(SECOND);
+        TEST_ASSERT_EQUAL(0, image_position());
+    }
+}
+
+/* -- SYN ----------------------------------------------------------------------------------------------------------- */
+
+/* From the falling edge of sync to the first pulse, over 1,000 random phases. */
+static void spread(const char *name, const char *line, bool receiving, uint64_t wait)
+{
+    boot(250000, 0, 2);
+    uint64_t least = UINT64_MAX, most = 0;
+    srand(1);
+    for (unsigned i = 0; i < 1000; i++) {
+        image_do(line);
+        image_train_clear();
+        if (receiving)
+            flood(2);
+        uint64_t edge = board_cycle(board) + 5000 + (unsigned)rand() % 5000;
+        board_pin_drive_at(board, SYNC, 0, edge);
+        board_pin_drive_at(board, SYNC, 1, edge + 10 * US);
+        image_run(10000 + 100 * US + wait);
+        if (train.count == 0)
+            image_fail("%s, round %u: no pulse", name, i);
+        uint64_t delay = train.pulse[0].cycle - edge;
+        least = delay < least ? delay : least;
+        most = delay > most ? delay : most;
+        image_sent();
+        image_send("S\r");
+        image_sent();
+        image_run(3 * MS);
+    }
+    printf("sync to first pulse, %s: %llu to %llu cycles\n", name, (unsigned long long)least, (unsigned long long)most);
+    if (most - least > US)
+        image_fail("%s: expected a spread of 16 cycles at most, saw %llu", name, (unsigned long long)(most - least));
+    image_assert_near("the shortest", 120 + (double)wait, (double)least, 10);
+}
+
+/* SYN-004, SYN-010, PIN-008 */
+static void test_sync_starts_within_a_microsecond_of_a_fixed_time(void)
+{
+    spread("idle", "m10svc1000a999d999", false, 0);
+    image_off();
+    spread("receiving", "m10svc1000a999d999", true, 0);
+}
+
+/* SWT-001, SWT-002 */
+static void test_the_start_wait_counts_from_sync(void)
+{
+    spread("idle, wait 1,000 us", "m10svc1000t1000a999d999", false, 1000 * US);
+    image_off();
+    spread("receiving, wait 5,000 us", "m10svc1000t5000a999d999", true, 5000 * US);
+}
+
+/* SYN-001, SYN-002, SYN-008, SYN-009 */
+static void test_y_releases_what_is_held_and_nothing_else(void)
+{
+    boot(38400, 0, 2);
+    image_do("y");
+    board_pin_drive(board, SYNC, 0);
+    image_run(MS);
+    image_do("m20sv100a1d1");
+    image_assert_no_pulse_for(SECOND);
+    board_pin_drive(board, SYNC, 1);
+    image_assert_no_pulse_for(SECOND);
+    image_refused("Y", "?1 unknown command");
+    image_assert_no_pulse_for(SECOND);
+    image_do("y");
+    image_idle(LONG_WAIT);
+    image_assert_pulses(20);
+    image_do("m20sv100a1d1");
+    image_assert_no_pulse_for(SECOND);
+    image_do("S");
+    image_do("y");
+    image_assert_no_pulse_for(SECOND);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -264,5 +403,11 @@ int main(void)
     RUN_TEST(test_no_pulse_begins_3_us_after_estop_in_ramps);
     RUN_TEST(test_no_pulse_begins_3_us_after_estop_with_the_terminal_busy);
     RUN_TEST(test_no_pulse_begins_3_us_after_estop_at_starts_joins_and_stops);
+    RUN_TEST(test_while_estop_is_low_motion_is_refused_and_nothing_restarts_afterwards);
+    RUN_TEST(test_estop_that_is_low_at_boot_is_active);
+    RUN_TEST(test_estop_ends_a_start_wait_and_a_sync_hold);
+    RUN_TEST(test_sync_starts_within_a_microsecond_of_a_fixed_time);
+    RUN_TEST(test_the_start_wait_counts_from_sync);
+    RUN_TEST(test_y_releases_what_is_held_and_nothing_else);
     return UNITY_END();
 }

@@ -1,4 +1,5 @@
 #include "host/fakes/step_player.h"
+#include "motion/engine.h"
 #include "motion/estop_port.h"
 #include <stdlib.h>
 #include <string.h>
@@ -610,3 +611,5 @@ bool estop_port_active(void)
 {
     return false;
 }
+
+void engine_on_start(void) {}
