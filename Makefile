@@ -46,6 +46,7 @@ FIRMWARE_SRCS := \
     firmware/motion/profile.c \
     firmware/motion/engine.c \
     firmware/queue/encoder.c \
+    firmware/queue/ops.c \
     firmware/queue/queue.c \
     firmware/queue/session.c \
     firmware/cli/commands.c \
@@ -74,12 +75,12 @@ FIRMWARE_SRCS := \
 # needed on the host alone, and assembler on the AVR alone.
 
 HOST_TESTS := test_number test_status test_baud test_line test_settings test_store test_session test_queue \
-    test_encoder test_motion_syntax test_commands test_configure test_display test_terminal test_boot test_drivers \
+    test_encoder test_ops test_motion_syntax test_commands test_configure test_display test_terminal test_boot test_drivers \
     test_wide test_block test_ramp test_profile test_engine test_property_planner
 FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 STORE_SRCS := firmware/eeprom/store.c firmware/base/crc16.c firmware/settings.c test/host/fakes/eeprom_port_fake.c
 CLI_SRCS := firmware/cli/commands.c firmware/cli/configure.c firmware/cli/display.c firmware/cli/text.c firmware/cli/motion_syntax.c \
-    firmware/base/number.c firmware/queue/encoder.c firmware/queue/queue.c firmware/queue/session.c $(STORE_SRCS) \
+    firmware/base/number.c firmware/queue/encoder.c firmware/queue/ops.c firmware/queue/queue.c firmware/queue/session.c $(STORE_SRCS) \
     test/host/fakes/encoder_port_fake.c $(FAKE_SRCS)
 test_number_SRCS := firmware/base/number.c
 test_status_SRCS := firmware/base/status.c
@@ -88,6 +89,7 @@ test_settings_SRCS := firmware/settings.c
 test_store_SRCS := $(STORE_SRCS)
 test_session_SRCS := firmware/queue/session.c firmware/settings.c
 test_queue_SRCS := firmware/queue/queue.c firmware/queue/session.c $(STORE_SRCS) $(FAKE_SRCS)
+test_ops_SRCS := firmware/queue/ops.c firmware/queue/session.c firmware/settings.c $(FAKE_SRCS)
 test_encoder_SRCS := firmware/queue/encoder.c test/host/fakes/encoder_port_fake.c test/host/fakes/engine_fake.c \
     test/host/fakes/terminal_port_fake.c firmware/settings.c
 test_motion_syntax_SRCS := firmware/cli/motion_syntax.c firmware/base/number.c firmware/queue/session.c \
@@ -114,7 +116,7 @@ AVR_TESTS := test_number test_line test_session test_wide test_block test_ramp t
 
 # Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
 IMAGE_TESTS := test_image_boot test_image_pins test_image_encoder test_image_motion test_image_queue test_image_sequence test_image_terminal test_image_stop \
-    test_image_configure test_image_timing test_image_stress
+    test_image_configure test_image_timing test_image_stress test_image_estop test_image_ops
 # What every whole-image test is linked with.
 IMAGE_COMMON_SRCS := test/image/image.c test/image/model.c
 

@@ -10,9 +10,11 @@
 #include "drivers.h"
 #include "eeprom/store.h"
 #include "motion/engine.h"
+#include "motion/estop_port.h"
 #include "pins_port.h"
 #include "queue/encoder.h"
 #include "queue/encoder_port.h"
+#include "queue/ops.h"
 #include "queue/queue.h"
 #include "settings.h"
 
@@ -56,12 +58,15 @@ int main(void)
         /* Cleared before the polls: what an interrupt leaves to do meanwhile is seen in this round or the next. */
         wake_flag = 0;
         boot_port_alive();
+        if (estop_port_poll()) {
+            queue_stop();
+        }
         bool worked = false;
         if (boot_over()) {
             if (!started) {
                 started = true;
                 if (boot_autorun_allowed() && snapshot == STATUS_OK && settings.autorun != 0) {
-                    queue_loop_from_first(settings.autorun);
+                    (void)queue_loop_from_first(settings.autorun);
                 }
             }
             worked = terminal_poll(); /* first: a line's end is what wakes a unit at rest, and its motion is awaited */
@@ -69,6 +74,7 @@ int main(void)
         worked |= encoder_poll();
         worked |= queue_poll();
         worked |= engine_poll();
+        ops_poll();
         worked |= store_poll();
         if (!worked) {
             wake_sleep();

@@ -41,6 +41,7 @@ typedef struct {
 } range_t;
 static const range_t positions FLASH = {QUEUE_FIRST, QUEUE_LAST, "1..30"};
 static const range_t array_entries FLASH = {0, QUEUE_ARRAY - 1, "0..30"};
+static const range_t flags FLASH = {0, 1, "0..1"};
 static const range_t counts FLASH = {0, UINT16_MAX, "0..65535"};
 
 /* The motion command, or single value, being read ahead: how many characters of the line it has seen, 0 for none. */
@@ -95,8 +96,7 @@ static status_t command_read_ahead(const char *rest)
         return status;
     }
     if (!ahead.single && ahead.command.count == 0) {
-        queue_preempt_with(QUEUE_CONTINUOUS, &ahead.command);
-        return status; /* what it names it keeps for itself (manual line 588) */
+        return queue_preempt_with(QUEUE_CONTINUOUS, &ahead.command); /* it keeps what it names for itself (line 588) */
     }
     if (!ahead.single) {
         status = queue_add(&ahead.command); /* it begins at once: everything else can wait */
@@ -123,10 +123,10 @@ static status_t command_one_shot(const char *rest)
     motion_syntax_begin(&ahead, 'm', &session);
     read_rest(rest);
     const status_t status = motion_syntax_end(&ahead);
-    if (status == STATUS_OK) {
-        queue_preempt_with(ahead.command.count == 0 ? QUEUE_CONTINUOUS : QUEUE_ONE_SHOT, &ahead.command);
+    if (status != STATUS_OK) {
+        return status;
     }
-    return status;
+    return queue_preempt_with(ahead.command.count == 0 ? QUEUE_CONTINUOUS : QUEUE_ONE_SHOT, &ahead.command);
 }
 
 /* x leaves a program mode; x<position> executes an entry. */
@@ -137,10 +137,7 @@ static status_t command_xref(const char *rest)
     }
     uint16_t position;
     const status_t status = read_only_number(rest, &position, &positions);
-    if (status == STATUS_OK) {
-        queue_preempt((uint8_t)position);
-    }
-    return status;
+    return status == STATUS_OK ? queue_preempt((uint8_t)position) : status;
 }
 
 static status_t command_run_array(const char *rest)
@@ -208,8 +205,7 @@ static status_t command_loop_passes(const char *rest)
 static status_t command_loop_all(const char *rest)
 {
     (void)rest;
-    queue_loop_from_first(QUEUE_LAST);
-    return STATUS_OK;
+    return queue_loop_from_first(QUEUE_LAST);
 }
 
 static status_t command_program_queue(const char *rest)
@@ -339,17 +335,31 @@ static status_t command_debug(const char *rest)
 
 static status_t command_ramp(const char *rest)
 {
-    if (!more(rest[0])) {
+    uint16_t on;
+    if (!more(*rest)) {
         return STATUS_OK; /* neither 0 nor 1: no change (A-SYS-02) */
     }
-    if (rest[0] < '0' || rest[0] > '9') {
-        return STATUS_SYNTAX;
+    const status_t status = read_only_number(rest, &on, &flags);
+    if (status == STATUS_OK) {
+        session_set_linear((uint8_t)on);
     }
-    if (rest[0] > '1' || more(rest[1])) {
-        ahead.range = motion_syntax_range_flag;
-        return STATUS_RANGE;
+    return status;
+}
+
+/* $O, $H, $K: soft ops 0 or 1; CRC and acknowledgements off with 0, and on with anything else. */
+static status_t command_option(const char *rest)
+{
+    const char letter = rest[-1];
+    uint16_t on = 1;
+    if (more(*rest)) {
+        const status_t status = read_only_number(rest, &on, letter == 'O' ? &flags : &counts);
+        if (status != STATUS_OK) {
+            return status;
+        }
+    } else if (letter == 'O') {
+        return STATUS_OK;
     }
-    session_set_linear((uint8_t)(rest[0] - '0'));
+    session_set_option(letter == 'O' ? SESSION_SOFT_OPS : letter == 'H' ? SESSION_CRC : SESSION_ACK, on != 0);
     return STATUS_OK;
 }
 
@@ -391,12 +401,6 @@ static status_t command_reset(const char *rest)
     (void)store_load_settings();
     boot_restart();
     return STATUS_OK;
-}
-
-static status_t command_later(const char *rest)
-{
-    (void)rest;
-    return STATUS_NOT_YET;
 }
 
 /* -- the table -------------------------------------------------------------------------------------------------------- */

@@ -11,6 +11,7 @@
 #include "queue/encoder.h"
 #include "queue/queue.h"
 #include "queue/session.h"
+#include "settings.h"
 
 static struct {
     const char *text;      /* in flash: what is still to come of the present text; 0: nothing is printed */
@@ -47,6 +48,10 @@ _Static_assert(((SHOWN_GAP | SHOWN_DEBUG) & SESSION_FLAGS) == 0, "flags that no 
 #define FAULTS "\x8D"
 #define ENTRY "\x8E"
 #define SETTING_CELL "\x8F"
+#define OPS "\x90"
+#define SOFT "\x91"
+#define CRC "\x92"
+#define ACKS "\x93"
 enum {
     FIELD_COUNT = 0x80,
     FIELD_RPM,
@@ -64,6 +69,10 @@ enum {
     FIELD_FAULTS,
     FIELD_ENTRY,
     FIELD_SETTING_CELL,
+    FIELD_OPS,
+    FIELD_SOFT,
+    FIELD_CRC,
+    FIELD_ACKS,
 };
 
 /* A choice between two texts: the first one if the command has the flag that is in these bits of the character. */
@@ -97,13 +106,12 @@ static const char queue_text[] FLASH = QUEUE_HEAD
     RULE "Q is at " NEXT "\t+ pulse\t\t\t* linear\t\ts sync\r\n"
     CHOICE(DEBUG, "executing " EXECUTING "\r\n", "");
 /* clang-format on */
-/* What the last line stands for is not built yet; it reads as it will at its factory values. */
 /* clang-format off */
 static const char defaults_text[] FLASH =
     "v " RPM " cycle " CYCLE "\r\n"
     "a " ACCEL " d " DECEL " " CHOICE(LINEAR, "linear", "harmonic") "\r\n"
     "GAP " CHOICE(GAP, "on", "off") ", " CHOICE(PULSES, "pulses", "full step") ", " CHOICE(THROTTLE, "EnT", "EnF") "\r\n"
-    "ops 36, soft_ops off, CRC 1, ACK on\r\n";
+    "ops " OPS ", soft_ops " SOFT ", CRC " CRC ", ACK " ACKS "\r\n";
 /* clang-format on */
 
 static const char array_text[] FLASH = "x_ " ROW " " ENTRY "\r\n" NEXT_ROW;
@@ -161,6 +169,13 @@ static void print_field(uint8_t field, const motion_command_t *command)
             number = 0u - number;
         }
         break;
+    case FIELD_OPS: number = settings.ops_mask; break;
+    case FIELD_CRC: number = (session.options & SESSION_CRC) != 0; break;
+    case FIELD_SOFT:
+    case FIELD_ACKS:
+        text_put_flash(session.options & (field == FIELD_SOFT ? SESSION_SOFT_OPS : SESSION_ACK) ? FLASH_TEXT("on")
+                                                                                               : FLASH_TEXT("off"));
+        return;
     case FIELD_SETTING_CELL: configure_put_cell(); return;
     case FIELD_STATE: text_put_flash(state_words[engine_state()]); return;
     case FIELD_ENTRY: number = queue_array(shown.row); break;

@@ -1,6 +1,7 @@
 /* Directions, pull-ups and idle levels of all posts, from the table in board.h. */
 #include "board.h"
 #include "pins_port.h"
+#include "queue/ops_port.h"
 #include <avr/io.h>
 
 /* All inputs have their pull-up on (manual lines 217, 678). */
@@ -28,8 +29,9 @@ void pins_init(void)
     DDRC = ddr_c;
     DDRD = ddr_d;
 
-    EICRA = 1 << ISC11; /* INT1, the sync pin: falling edges (section 13.2.1) */
-    EIMSK = 1 << INT1;
+    EICRA = 1 << ISC11 | 1 << ISC01; /* INT0, Estop, and INT1, sync: falling edges (section 13.2.1) */
+    EIFR = 1 << INTF0;
+    EIMSK = 1 << INT0;
 
     /* 1 MHz on OC2A from Timer2 alone: CTC, toggle every 8 cycles (datasheet section 18.7.2). */
     OCR2A = 7;
@@ -42,4 +44,16 @@ void pins_microsteps(uint8_t pins)
 {
     PINC = (uint8_t)((PORTC ^ pins << 3) & (1 << 3 | 1 << 4));
     PINB = (uint8_t)((PORTB ^ pins << 2) & 1 << 4);
+}
+
+void ops_port_set(bool executing)
+{
+    /* Single-bit instructions: no other bit of the port is touched. */
+    if (executing) {
+        PORTC &= (uint8_t)~(1 << 2);
+        PORTC |= 1 << 5;
+    } else {
+        PORTC &= (uint8_t)~(1 << 5);
+        PORTC |= 1 << 2;
+    }
 }

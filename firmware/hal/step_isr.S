@@ -9,12 +9,14 @@
  * (measured: make bench BENCH=isr)
  *
  * It is the only interrupt that is never interrupted: SREG rests in GPIOR2, the counter in GPIOR0 (low) and GPIOR1.
+ * Where it takes longer than Estop can wait it looks for Estop itself, and takes the clock from the timer.
  * The registers written here are double-buffered: they take effect when the running period ends (datasheet section
  * 16.9.3), so an interrupt that comes late by less than a period moves no edge. */
 #include <avr/io.h>
 #include "motion/segment.h"
 
 #define io(reg) _SFR_IO_ADDR(reg)
+#define MODE15_STOPPED (1 << WGM13 | 1 << WGM12) /* without a clock */
 
         .section .segments, "aw", @nobits
         .global segments
@@ -46,6 +48,12 @@ motion_state: .skip 1
         sts     OCR1BL, r24
 .endm
 
+/* Estop may not wait for the end of this interrupt: no clock, and its own interrupt comes next. */
+.macro look_for_estop
+        sbic    io(EIFR), INTF0
+        rcall   stop_clock
+.endm
+
 /* Counters, tail, dir and state for the segment at Z, which has been loaded or is about to be. */
 .macro account
         ldd     r24, Z + 4
@@ -55,6 +63,7 @@ motion_state: .skip 1
         mov     r24, r30
         subi    r24, -SEGMENT_BYTES
         sts     step_tail, r24
+        look_for_estop
         lds     r24, step_flags
         sbrc    r24, SEGMENT_SET_DIR_BIT
         rcall   set_dir
@@ -88,6 +97,10 @@ low_byte_over:
         out     io(GPIOR1), r24         /* 256 more: GPIOR0 is 0 already */
         rjmp    return
 
+empty:
+        ldi     r24, 0
+        rjmp    ring_empty
+
 segment_over:
         lds     r24, step_flags
         andi    r24, SEGMENT_EARLY_MASK
@@ -96,62 +109,70 @@ segment_over:
         push    r31
         lds     r30, step_tail
         ldi     r31, hi8(segments)
+        look_for_estop
         lds     r24, step_head
         cp      r24, r30
-        breq    1f
-        rjmp    load
-1:      ldi     r24, 0
-        rjmp    ring_empty
+        breq    empty
+load:
+        buffers
+        sbic    io(TIFR1), TOV1
+        rjmp    load_late
+loaded:
+        account
+leave:
+        pop     r31
+        pop     r30
+        in      r24, io(GPIOR2)
+        out     io(SREG), r24
+        pop     r24
+        reti
 
         /* Too short a period to reload in: the count ended early, and the periods still due are waited for here. The
          * first wait comes before anything else, so that a late interrupt misses none. */
 early:
+        sbis    io(EIMSK), INT0         /* called by Estop: there is nothing to wait for */
+        rjmp    stop_early
+1:      sbic    io(EIFR), INTF0
+        rjmp    stop_early
         sbis    io(TIFR1), TOV1
-        rjmp    early
+        rjmp    1b
         sbi     io(TIFR1), TOV1         /* clears the flag, and only this one (datasheet 14.4.3) */
         push    r30
         push    r31
         lds     r30, step_tail
         lds     r31, step_head
         cp      r31, r30
-        brne    2f
-        rjmp    early_empty
-2:      ldi     r31, hi8(segments)
+        breq    near_early_empty
+        look_for_estop
+        ldi     r31, hi8(segments)
         cpi     r24, 1 << SEGMENT_EARLY_SHIFT
-        brne    2f
-        rjmp    load
-2:
+        breq    load
         /* What would be too long for the last period is done before it. T = two more waits, not one. */
         bst     r24, SEGMENT_EARLY_SHIFT
         account
-3:      sbis    io(TIFR1), TOV1
-        rjmp    3b
+2:      sbic    io(EIFR), INTF0
+        rjmp    stop_early_again
+        sbis    io(TIFR1), TOV1
+        rjmp    2b
         sbi     io(TIFR1), TOV1
-        brtc    4f
+        brtc    3f
         clt
-        rjmp    3b
-4:
+        rjmp    2b
+3:
         buffers
         sbic    io(TIFR1), TOV1
-        rjmp    late
-leave:
-        pop     r31
-        pop     r30
-        rjmp    return
-
-load:
-        buffers
-        sbic    io(TIFR1), TOV1
-        rjmp    account_late
-        account
+        rcall   late
+        look_for_estop
         rjmp    leave
-
-account_late:
-        account
+load_late:
+        rcall   late
+        rjmp    loaded
 late:
         ldi     r24, 1
         sts     step_late, r24
-        rjmp    leave
+        ret
+near_early_empty:
+        rjmp    early_empty
 
         /* dir belongs to the segment whose only period has just begun: the last pulse before it has fallen. */
 set_dir:
@@ -160,6 +181,43 @@ set_dir:
         sbrs    r24, SEGMENT_DIR_BIT
         cbi     io(PORTB), 5
         ret
+
+stop_clock:
+        push    r24
+        ldi     r24, MODE15_STOPPED
+        sts     TCCR1B, r24
+        pop     r24
+        ret
+
+        /* Estop while periods are waited for: those still due are left to be counted as usual. */
+stop_early:
+        rcall   stop_clock
+        push    r30
+        push    r31
+        lds     r30, step_tail
+        lds     r24, step_flags
+        andi    r24, SEGMENT_EARLY_MASK
+        lsr     r24
+        lsr     r24
+        lsr     r24
+        rjmp    uncount
+stop_early_again:
+        rcall   stop_clock
+        ldi     r24, 1
+        brtc    uncount
+        ldi     r24, 2
+uncount:                                /* r24: periods due, r30: what was to be loaded */
+        out     io(GPIOR0), r24
+        ldi     r31, 0
+        out     io(GPIOR1), r31
+        ldi     r31, hi8(segments)
+        sts     step_tail, r30
+        subi    r30, SEGMENT_BYTES
+        ldd     r24, Z + 6
+        andi    r24, ~SEGMENT_EARLY_MASK
+        std     Z + 6, r24
+        sts     step_flags, r24
+        rjmp    leave
 
 early_empty:
         lsr     r24
@@ -176,6 +234,7 @@ ring_empty:                             /* r24: periods of the segment that are 
         ldi     r30, 0
         out     io(GPIOR1), r30
         out     io(GPIOR0), r31
+        look_for_estop
         tst     r31
         breq    1f
         rjmp    leave                   /* they are counted as usual */
@@ -202,3 +261,55 @@ run_out:
         sts     wake_flag, r24          /* it may be about to sleep */
         rjmp    leave
         .size TIMER1_OVF_vect, . - TIMER1_OVF_vect
+
+/* Estop. First of all the timer stands still, and with it everything that could move clk. Then what has been is counted,
+ * and a pulse that has begun is completed: the clock comes back for it, and what follows it is silence that nobody
+ * counts, until the main loop takes the clock for good. That this interrupt is off (EIMSK) tells everybody that Estop
+ * has struck. No instruction here changes SREG. */
+        .global INT0_vect
+        .type INT0_vect, @function
+INT0_vect:
+        push    r24
+        ldi     r24, MODE15_STOPPED
+        sts     TCCR1B, r24
+        sts     wake_flag, r24          /* not 0 */
+        ldi     r24, 0
+        out     io(EIMSK), r24          /* a held command is not released any more either */
+        lds     r24, TIMSK1
+        sbrs    r24, TOIE1
+        rjmp    1f
+        sbis    io(TIFR1), TOV1
+        rjmp    1f
+        sbi     io(TIFR1), TOV1
+        rcall   TIMER1_OVF_vect         /* the step interrupt was about to come */
+        cli
+1:      ldi     r24, 0
+        sts     TIMSK1, r24
+        sbis    io(PINB), 2
+        rjmp    2f
+        ldi     r24, hi8(SEGMENT_SILENT)
+        sts     OCR1BH, r24
+        sts     OCR1BL, r24
+        ldi     r24, MODE15_STOPPED | (1 << CS10)
+        sts     TCCR1B, r24
+        ldi     r24, MODE15_STOPPED
+        nop
+        nop
+        nop
+        sbis    io(PINB), 2             /* it was in its last tick, and is counted already */
+        sts     TCCR1B, r24
+2:      pop     r24
+        reti
+        .size INT0_vect, . - INT0_vect
+
+/* The sync pin has fallen: the timer stands ready but for its clock. Enabled only then, and for one edge. */
+        .global INT1_vect
+        .type INT1_vect, @function
+INT1_vect:
+        push    r24
+        ldi     r24, MODE15_STOPPED | (1 << CS10)
+        sts     TCCR1B, r24
+        cbi     io(EIMSK), INT1
+        pop     r24
+        reti
+        .size INT1_vect, . - INT1_vect

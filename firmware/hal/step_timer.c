@@ -4,6 +4,7 @@
  * share one TEMP byte, so the main loop touches them only with interrupts off or the timer stopped. */
 #include "base/atomic.h"
 #include "base/inline.h"
+#include "motion/estop_port.h"
 #include "motion/segment.h"
 #include "motion/step_port.h"
 #include <avr/interrupt.h>
@@ -58,7 +59,7 @@ void step_port_dir(bool level)
 }
 
 /* The timer stands ready: all but its clock. */
-void step_port_hold(void)
+static void make_ready(void)
 {
     step_port_init();
     set_compare(STEP_PORT_LEAD_TICKS + LEAD_BEGIN - 1, SEGMENT_SILENT);
@@ -83,30 +84,47 @@ void step_port_hold(void)
     TIMSK1 = 1 << TOIE1;
 }
 
-void step_port_start(void)
+/* The INT1 interrupt is enabled while the timer is held, the INT0 interrupt until Estop has struck. */
+void step_port_hold(void)
 {
-    step_port_hold();
-    TCCR1B = RUNNING;
+    make_ready();
+    EIFR = 1 << INTF1; /* an edge before this moment does not count */
+    uint8_t state = atomic_begin();
+    if (EIMSK & 1 << INT0)
+        EIMSK |= 1 << INT1;
+    atomic_end(state);
 }
 
-/* Held: ready, and nobody has given it a clock. */
-static inline void release(void)
+void step_port_start(void)
 {
-    if (TIMSK1 && TCCR1B == MODE15_B)
+    make_ready();
+    uint8_t state = atomic_begin();
+    if (EIMSK & 1 << INT0)
         TCCR1B = RUNNING;
+    atomic_end(state);
 }
 
 void step_port_release(void)
 {
     uint8_t state = atomic_begin();
-    release();
+    if (EIMSK & 1 << INT1) {
+        TCCR1B = RUNNING;
+        EIMSK &= (uint8_t)~(1 << INT1);
+    }
     atomic_end(state);
 }
 
-/* The sync pin has fallen. */
-ISR(INT1_vect)
+bool estop_port_active(void)
 {
-    release();
+    return !(EIMSK & 1 << INT0) || !(PIND & 1 << 2);
+}
+
+bool estop_port_poll(void)
+{
+    bool active = estop_port_active();
+    if (active && PIND & 1 << 2) /* not one that strikes just now */
+        EIMSK |= 1 << INT0;
+    return active;
 }
 
 step_snapshot_t step_port_snapshot(void)
@@ -142,26 +160,29 @@ void step_port_halt(void)
         const segment_t *loaded = segment_at((uint8_t)(tail - SEGMENT_BYTES));
         const segment_t *before = segment_at((uint8_t)(tail - 2 * SEGMENT_BYTES));
         bool fast = loaded->top < SEGMENT_EARLY1_BELOW_TICKS || before->top < SEGMENT_EARLY1_BELOW_TICKS;
+        uint8_t low = GPIOR0;
+        const segment_t *s = loaded;
+        if (low == s->count_low && GPIOR1 == s->count_high)
+            s = before; /* its last period is running */
+        uint16_t match = s->match;
         cli();
         if (TCCR1B == MODE15_B) {
             TIMSK1 = 0; /* it is held */
+            EIMSK &= (uint8_t)~(1 << INT1);
             sei();
             return;
         }
-        if (tail == step_tail && !(TIFR1 & 1 << TOV1)) {
+        if (tail == step_tail && low == GPIOR0 && !(TIFR1 & 1 << TOV1)) {
             if (fast) {
                 /* A pulse is due or there, and over in a moment: freeze right behind it. */
                 while (!(TIFR1 & 1 << TOV1))
-                    ;
+                    if (EIFR & 1 << INTF0)
+                        goto let_pass; /* it knows better */
                 TCCR1B = MODE15_B;
                 TIMSK1 = 0;
                 sei();
                 return;
             }
-            const segment_t *s = loaded;
-            if (GPIOR0 == s->count_low && GPIOR1 == s->count_high)
-                s = before; /* its last period is running */
-            uint16_t match = s->match;
             uint16_t now = TCNT1;
             if (match == SEGMENT_SILENT || (uint16_t)(now + FREEZE_TICKS) < match) {
                 TCCR1B = MODE15_B; /* no clock: nothing moves from here on */
@@ -170,31 +191,36 @@ void step_port_halt(void)
                 return;
             }
         }
-        /* A pulse is due or there: let it pass. */
+    let_pass: /* a pulse is due or there, or Estop */
         sei();
         __asm__ __volatile__("nop\n\tnop");
     }
+    while (PINB & 1 << 2)
+        ; /* Estop's last pulse */
     TCCR1B = MODE15_B;
-    TIFR1 = 1 << TOV1;
 }
 
 void step_port_finish(void)
 {
-    while (!step_idle || !(TIFR1 & 1 << TOV1))
+    while (TIMSK1 || (TCCR1B == RUNNING && !(TIFR1 & 1 << TOV1)))
         ;
 }
 
 bool step_port_arm(uint8_t offset, uint16_t top, uint16_t match, uint8_t flags)
 {
     segment_t *s = segment_at(offset);
-    uint16_t before_top = segment_at((uint8_t)(offset - SEGMENT_BYTES))->top;
+    const segment_t *before = segment_at((uint8_t)(offset - SEGMENT_BYTES));
+    uint16_t rise = before->top; /* or the end, if it is silent: Estop must not wait for this either */
+    if (before->match < rise)
+        rise = before->match;
     uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
+    uint8_t head = step_head;
+    bool done = false;
     uint8_t state = atomic_begin();
     uint8_t tail = step_tail;
-    uint8_t distance = (uint8_t)(after - tail);
-    bool done = (uint8_t)(distance - 1) < (uint8_t)(step_head - tail);
-    if (before_top >= ARM_LEAST_TICKS && distance == 0 && !step_idle && !(TIFR1 & 1 << TOV1) &&
-        (uint16_t)(TCNT1 + ARM_TICKS) < before_top) {
+    if (tail != after) {
+        done = (uint8_t)(after - tail) <= (uint8_t)(head - tail);
+    } else if (rise >= ARM_LEAST_TICKS && TIMSK1 && !(TIFR1 & 1 << TOV1) && (uint16_t)(TCNT1 + ARM_TICKS) < rise) {
         /* Loaded, but the period before it is still running: into the buffers. */
         set_compare(top, match);
         step_flags = flags;
@@ -214,18 +240,19 @@ bool step_port_extend(uint8_t offset)
 {
     segment_t *s = segment_at(offset);
     uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
+    uint8_t head = step_head;
     uint16_t extended = (uint16_t)(less_one(s->count_low, s->count_high) + 1);
     bool done = false;
 
     uint8_t state = atomic_begin();
-    uint8_t distance = (uint8_t)(after - step_tail);
-    if (distance == 0) {
+    uint8_t tail = step_tail;
+    if (tail == after) {
         uint8_t low = GPIOR0;
         if (low >= 16 && low != 255) {
             GPIOR0 = (uint8_t)(low + 1);
             done = true;
         }
-    } else if (distance <= (uint8_t)(step_head - step_tail)) {
+    } else if ((uint8_t)(after - tail) <= (uint8_t)(head - tail)) {
         set_less_one(s, extended); /* here already: the interrupt may be about to load it */
         done = true;
     }

@@ -1,11 +1,10 @@
 /* USART0 as the terminal's port: rings between the main loop and the interrupts of usart_isr.S.
  * Source: ATmega328P datasheet DS40002061, section 20. */
 #include <avr/io.h>
-#include "base/atomic.h"
-#include "base/inline.h"
 #include "cli/terminal_port.h"
 #include "hal/baud.h"
 #include "hal/usart.h"
+#include "queue/ops_port.h"
 
 _Static_assert(TERMINAL_PORT_DAMAGED == USART_DAMAGED, "the terminal knows a damaged byte by this value");
 
@@ -19,7 +18,7 @@ void terminal_port_init(uint32_t baud)
     UCSR0A = divisor.u2x ? (uint8_t)_BV(U2X0) : 0;
     UBRR0 = divisor.ubrr;
     UCSR0C = _BV(UCSZ01) | _BV(UCSZ00); /* 8 data bits, no parity, 1 stop bit */
-    UCSR0B = _BV(RXCIE0) | _BV(RXEN0) | _BV(TXEN0);
+    UCSR0B = USART_CONTROL | _BV(RXCIE0);
 }
 
 int16_t terminal_port_get(void)
@@ -33,21 +32,21 @@ int16_t terminal_port_get(void)
     return byte;
 }
 
-NOINLINE uint8_t terminal_port_waiting(void)
+uint8_t terminal_port_waiting(void)
 {
     const uint8_t head = usart_rx_head;
     const uint8_t tail = usart_rx_tail;
     return (uint8_t)(head >= tail ? head - tail : head + USART_RX_BYTES - tail);
 }
 
-uint8_t terminal_port_peek(uint8_t others)
-{
-    return usart_rx_bytes[others];
-}
-
 uint8_t terminal_port_free(void)
 {
     return (uint8_t)((usart_tx_tail - usart_tx_head - 1) & (USART_TX_BYTES - 1));
+}
+
+uint8_t terminal_port_peek(uint8_t others)
+{
+    return usart_rx_bytes[others];
 }
 
 bool terminal_port_idle(void)
@@ -61,8 +60,12 @@ void terminal_port_put(uint8_t byte)
     const uint8_t head = usart_tx_head;
     usart_tx_bytes[head] = byte;
     usart_tx_head = (uint8_t)((head + 1) & (USART_TX_BYTES - 1));
-    /* The interrupts write UCSR0B too: 7 cycles masked. */
-    const uint8_t state = atomic_begin();
-    UCSR0B |= _BV(UDRIE0);
-    atomic_end(state);
+    UCSR0B = USART_CONTROL | _BV(RXCIE0) | _BV(UDRIE0);
+}
+
+void ops_port_send(uint8_t byte)
+{
+    if (terminal_port_free() != 0) {
+        terminal_port_put(byte);
+    }
 }

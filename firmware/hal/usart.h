@@ -10,6 +10,9 @@
  * character of any command; in binary data a checksum tells it from a genuine 0xFF. */
 #define USART_DAMAGED 0xFF
 
+/* UCSR0B while an interrupt of the port is at work. */
+#define USART_CONTROL ((1 << RXEN0) | (1 << TXEN0))
+
 #ifndef __ASSEMBLER__
 #include <stdint.h>
 

@@ -1,14 +1,15 @@
 ; The two interrupts of USART0.
 ;
-; A step interrupt may be due every 32 cycles, so these mask only themselves (RXCIE0 or UDRIE0), allow interrupts at
-; once and do their work interruptible. Both flags would otherwise call the interrupt again at once: they stay raised
-; until the data register was read or written.
+; A step interrupt may be due every 32 cycles, and Estop and sync at any moment, so these mask only themselves (RXCIE0 and
+; UDRIE0 alike), allow interrupts at once and do their work interruptible. Both flags would otherwise call the interrupt
+; again at once: they stay raised until the data register was read or written.
 ;
-;   flag raised to `sei`     18 cycles with interrupts masked (entry 4, vector jump 3, 11 here)
-;   `cli` to end of `reti`   15 cycles masked
-;   whole run                receive 71 cycles (overrun 95), transmit 67
+;   flag raised to `sei`     13 cycles with interrupts masked (entry 4, vector jump 3, 6 here)
+;   `cli` to end of `reti`   9 cycles masked
+;   whole run                receive 78 cycles (overrun 102), transmit 77
 ;
-; UCSR0B is read, changed and written only while interrupts are masked, here as in usart.c.
+; What UCSR0B is afterwards follows from the transmit ring alone: UDRIE0 is set unless that is empty. So nobody has to
+; read it, and usart.c may write it at any time.
 ; Shared: usart.h says who writes which index.
 ; Source: ATmega328P datasheet DS40002061, 20.7.3 (receiver error flags: read UCSR0A before UDR0), 20.11.3.
 
@@ -36,38 +37,23 @@
 
 .section .text
 
-.macro ENTER enable_bit         ; cycles since the flag was raised
+.macro ENTER                    ; cycles since the flag was raised
     push r24                    ; 9
-    in   r24, IO_SREG           ; 10
-    push r24                    ; 12
-    lds  r24, ADDRESS(UCSR0B)   ; 14
-    andi r24, 0xFF & ~(1 << \enable_bit) ; 15
-    sts  ADDRESS(UCSR0B), r24   ; 17
-    sei                         ; 18
+    ldi  r24, USART_CONTROL     ; 10
+    sts  ADDRESS(UCSR0B), r24   ; 12
+    sei                         ; 13
+    in   r24, IO_SREG
+    push r24
     push r25
     push r30
     push r31
-.endm
-
-.macro LEAVE_ENABLED enable_bit ; cycles masked
-    pop  r31
-    pop  r30
-    pop  r25
-    cli
-    lds  r24, ADDRESS(UCSR0B)   ; 2
-    ori  r24, (1 << \enable_bit) ; 3
-    sts  ADDRESS(UCSR0B), r24   ; 5
-    pop  r24                    ; 7
-    out  IO_SREG, r24           ; 8
-    pop  r24                    ; 10
-    reti                        ; 14
 .endm
 
 ; -- receive ----------------------------------------------------------------------------------------------------------
 
 .global USART_RX_vect
 USART_RX_vect:
-    ENTER RXCIE0
+    ENTER
     lds  r25, ADDRESS(UCSR0A)
     lds  r24, ADDRESS(UDR0)
     andi r25, (1 << FE0) | (1 << DOR0)
@@ -78,8 +64,26 @@ good:
     sts  usart_rx_head, r25
     ldi  r24, 1
     sts  wake_flag, r24
-received:
-    LEAVE_ENABLED RXCIE0
+done:
+    lds  r25, usart_tx_tail
+    lds  r24, usart_tx_head
+    cp   r24, r25
+    pop  r31
+    pop  r30
+    pop  r25
+    pop  r24                    ; SREG
+    brne more
+    out  IO_SREG, r24
+    ldi  r24, USART_CONTROL | (1 << RXCIE0)
+leave:                          ; cycles masked
+    cli
+    sts  ADDRESS(UCSR0B), r24   ; 2
+    pop  r24                    ; 4
+    reti                        ; 8
+more:
+    out  IO_SREG, r24
+    ldi  r24, USART_CONTROL | (1 << RXCIE0) | (1 << UDRIE0)
+    rjmp leave
 
 ; In a full ring the newest byte becomes USART_DAMAGED: the main loop cannot be reading that one.
 full:
@@ -91,7 +95,7 @@ full:
     sbci r31, hi8(-(usart_rx_bytes))
     ldi  r24, USART_DAMAGED
     st   Z, r24
-    rjmp received
+    rjmp done
 
 ; Bytes were lost before this one (overrun): USART_DAMAGED goes before it. Or this one is not what was sent (framing
 ; error): USART_DAMAGED goes in its place, because the byte itself might read as the end of a line and set the rest of
@@ -112,11 +116,12 @@ damaged:
 ; The data register is empty. With the last byte the interrupt stays masked until the main loop puts another one.
 .global USART_UDRE_vect
 USART_UDRE_vect:
-    ENTER UDRIE0
+    ENTER
     lds  r25, usart_tx_tail
     lds  r24, usart_tx_head
     cp   r24, r25
-    breq idle
+    brne . + 2                  ; over the next instruction
+    rjmp done
     mov  r30, r25
     ldi  r31, 0
     subi r30, lo8(-(usart_tx_bytes))
@@ -128,14 +133,4 @@ USART_UDRE_vect:
     sts  usart_tx_tail, r25
     ldi  r30, 1
     sts  wake_flag, r30
-    cp   r24, r25
-    breq idle
-    LEAVE_ENABLED UDRIE0
-idle:
-    pop  r31
-    pop  r30
-    pop  r25
-    pop  r24
-    out  IO_SREG, r24           ; interrupts masked again: SREG as it was at the entry
-    pop  r24
-    reti
+    rjmp done

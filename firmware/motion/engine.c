@@ -4,6 +4,7 @@
 #include "base/inline.h"
 #include "drivers.h"
 #include "motion/block.h"
+#include "motion/estop_port.h"
 #include "motion/profile.h"
 #include "motion/ramp.h"
 #include "motion/segment.h"
@@ -74,6 +75,7 @@ static struct {
     uint32_t in_play_cycle_us; /* 0: follows from v_in_play */
     uint8_t begun; /* commands, modulo 256 */
     uint8_t ended;
+    uint8_t played; /* those of them that were more than a start wait */
     uint8_t faults;
     bool gap_off;
     bool single; /* the ring plays single pulses */
@@ -95,13 +97,10 @@ static bool is_held(const motion_command_t *c)
     return (c->flags & MOTION_SYNC) != 0;
 }
 
-/* Microseconds from the release, or the end of what was before, to the first pulse. One that is held begins a fixed time
- * later, so that units which are released together differ by their waits. */
-static NOINLINE uint32_t lead_us(void)
+/* The first pulse comes so long after the start wait: with those that are released together, a fixed time. */
+static uint16_t setup_ticks(void)
 {
-    uint32_t us = command.start_wait_us;
-    uint16_t least = DIR_SETUP_TICKS / TICKS_PER_US + settings.pulse_us;
-    return is_held(&command) && us < UINT32_MAX - least ? us + least : us;
+    return (uint16_t)(DIR_SETUP_TICKS + engine.width_ticks);
 }
 
 static NOINLINE bool has_no_ramps(const motion_command_t *c)
@@ -204,6 +203,7 @@ static bool has_begun(uint8_t offset)
 static void end_joined(void)
 {
     engine.ended = (uint8_t)(engine.ended + engine.joined);
+    engine.played = (uint8_t)(engine.played + engine.joined);
     engine.joined = 0;
 }
 
@@ -215,6 +215,7 @@ static void look_for_end(void)
     if (engine.tail_awaited && has_begun(engine.tail_offset)) {
         engine.tail_awaited = false;
         engine.ended++;
+        engine.played++;
     }
 }
 
@@ -352,12 +353,13 @@ int32_t engine_position(void)
     const segment_t *loaded = segment_at(loaded_offset);
     const segment_t *running = loaded;
     uint16_t counted = counted_periods(loaded);
-    if (at.to_count == counted)
-        running = segment_at((uint8_t)(loaded_offset - SEGMENT_BYTES));
     int32_t to_come = pulses_from(at.tail);
-    if (!step_idle)
+    if (!step_idle) { /* otherwise its last period is running, or over */
+        if (at.to_count == counted)
+            running = segment_at((uint8_t)(loaded_offset - SEGMENT_BYTES));
         to_come += signed_pulses(loaded, (uint16_t)(at.to_count + early_periods(loaded)));
-    if (!at.pulse_high && !at.period_over && !step_idle)
+    }
+    if (!at.pulse_high && !at.period_over)
         to_come += signed_pulses(running, 1);
     return engine.emitted - to_come;
 }
@@ -639,13 +641,21 @@ static bool emit_other(void)
     }
     if (stage == STAGE_REST || (stage == STAGE_GAP && engine.next))
         return false; /* (it will be joined) */
-    engine.stage = (stage_t)(stage + 1);
     if (stage == STAGE_LEAD) {
-        /* The start wait, then the first pulse. */
-        uint32_t us = lead_us();
+        /* The start wait, then the first pulse: in a short period of its own, because the state changes when it begins. */
+        uint32_t us = command.start_wait_us;
+        command.start_wait_us = 0;
         engine.ramp_state = MOTION_STANDBY;
-        set_interval(us >> PROFILE_CHUNK_US_LOG2, (uint16_t)us % PROFILE_CHUNK_US * TICKS_PER_US, true);
-    } else if (stage == STAGE_TAIL) {
+        if (us) {
+            set_interval(us >> PROFILE_CHUNK_US_LOG2, (uint16_t)us % PROFILE_CHUNK_US * TICKS_PER_US, false);
+        } else {
+            push(1, setup_ticks(), true);
+            engine.stage = STAGE_RUN;
+        }
+        return true;
+    }
+    engine.stage = (stage_t)(stage + 1);
+    if (stage == STAGE_TAIL) {
         push_tail();
         engine.v_in_play = p->v_exit;
         engine.in_play_cycle_us = p->exit_cycle_us;
@@ -822,7 +832,6 @@ static void start_next(void)
 {
     begin_ring();
     take_next();
-    uint32_t us = lead_us();
     bool held = is_held(&command);
     if (held)
         expire_gap();
@@ -831,28 +840,37 @@ static void start_next(void)
     flags &= 1 << SEGMENT_CCW_BIT;
     uint16_t cruised = 0;
     engine.stage = STAGE_LEAD;
-    if (us < 4096u) {
-        uint16_t lead = (uint16_t)(us * TICKS_PER_US);
-        uint16_t least = (uint16_t)(DIR_SETUP_TICKS + engine.width_ticks);
-        append(1, (uint16_t)((lead < least ? least : lead) - 1), engine.width_ticks, flags);
+    if (command.start_wait_us < 3072u) {
+        uint16_t wait = (uint16_t)(command.start_wait_us * TICKS_PER_US);
+        uint16_t lead = setup_ticks();
+        uint8_t first_flags = flags;
         engine.stage = STAGE_RUN;
         engine.ahead_ticks = certain_ticks();
-        if (engine.ahead_ticks) {
+        if (engine.ahead_ticks)
             flags = (uint8_t)(flags | (command.accel == ACCEL_NONE ? MOTION_CRUISE : MOTION_ACCEL));
+        if (wait >= SHORTEST_PIECE_TICKS) {
+            append_silence(1, (uint16_t)(wait - 1), first_flags);
+        } else {
+            lead = (uint16_t)(lead + wait);
+            first_flags = flags; /* known at once, not only when the pulse is over */
+        }
+        append(1, (uint16_t)(lead - 1), engine.width_ticks, first_flags);
+        if (engine.ahead_ticks) {
             append_silence(AHEAD_PERIODS, (uint16_t)(engine.ahead_ticks / AHEAD_PERIODS - 1), flags);
             play();
+            engine_on_start();
         } else {
             cruised = begin_cruise();
         }
         add_pulses(flags, 1);
     } else {
-        emit(); /* sets the interval up, then its silence, then the pulse */
-        emit();
-        emit();
+        for (uint8_t steps = 4; steps > 0; steps--)
+            emit(); /* sets the wait up, then its silence, then the pulse */
         if (!held)
             play();
     }
     plan();
+    engine_on_start();
     profile.cruise_pulses -= cruised;
     fill();
     if (held) {
@@ -1018,6 +1036,11 @@ uint8_t engine_commands_ended(void)
     return engine.ended;
 }
 
+uint8_t engine_commands_played(void)
+{
+    return engine.played;
+}
+
 /* A command has been begun (its start wait included) and has not ended. */
 static bool running(void)
 {
@@ -1040,8 +1063,11 @@ static void halt(void)
     if (!engine.playing)
         return;
     step_port_halt();
-    if (running())
+    if (running()) {
         engine.ended++;
+        if (motion_state != MOTION_STANDBY)
+            engine.played++;
+    }
     engine.emitted = engine_position();
     engine.playing = false;
     drop_emission();
@@ -1146,6 +1172,8 @@ void engine_single_pulse(bool ccw)
     } else if (running() || engine.next) {
         return;
     }
+    if (estop_port_active())
+        return;
     begin_ring();
     engine.stage = STAGE_REST;
     engine.single = true;

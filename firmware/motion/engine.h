@@ -27,6 +27,10 @@ status_t engine_check(const motion_command_t *command);
 void engine_offer(const motion_command_t *command);
 uint8_t engine_commands_begun(void); /* taken from the offers since boot, modulo 256 */
 
+/* Called in the middle of a start from standstill, which takes a millisecond or two: the first pulse is due, or has been
+ * made. To be implemented by who has to know (queue/ops.c). */
+void engine_on_start(void);
+
 /* Lets a command with MOTION_SYNC that stands ready begin: its first pulse comes a fixed time later, and its start wait.
  * The sync pin does the same by itself. With nothing held nothing happens. */
 void engine_release(void);
@@ -36,6 +40,7 @@ bool engine_poll(void);
 
 /* Number of commands ended (completed or cut short) since boot, modulo 256. */
 uint8_t engine_commands_ended(void);
+uint8_t engine_commands_played(void); /* of these, all but those stopped before their first pulse; modulo 256 */
 
 void engine_stop(void);                                     /* S: no further pulse; everything taken is dropped */
 void engine_stop_graceful(accel_code_t decel, bool linear); /* s: ramp down from the present speed, drop the rest */

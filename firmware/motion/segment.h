@@ -30,7 +30,7 @@
 
 /* Periods below these are not reloaded within themselves but one, two or three periods early: interrupt latency (28)
  * plus the cycles from the flag to the last register (53), with room. docs/design.md */
-#define SEGMENT_EARLY1_BELOW_TICKS 84
+#define SEGMENT_EARLY1_BELOW_TICKS 82
 #define SEGMENT_EARLY2_BELOW_TICKS 48
 #define SEGMENT_EARLY3_BELOW_TICKS 40
 

@@ -2,6 +2,7 @@
 #include "base/inline.h"
 #include "eeprom/store.h"
 #include "motion/engine.h"
+#include "motion/estop_port.h"
 #include "queue/encoder.h"
 #include "queue/session.h"
 #include "settings.h"
@@ -201,6 +202,9 @@ static void write(uint8_t position, const motion_command_t *command, bool added)
 status_t queue_add(const motion_command_t *command)
 {
     (void)note_begun();
+    if (estop_port_active()) {
+        return STATUS_ESTOP;
+    }
     if (pending == QUEUE_LAST) {
         return STATUS_QUEUE_FULL;
     }
@@ -237,18 +241,22 @@ status_t queue_undo(void)
 
 /* -- preemption -------------------------------------------------------------------------------------------------- */
 
-void queue_preempt(uint8_t position)
+status_t queue_preempt(uint8_t position)
+{
+    return queue_preempt_with(position, &entries[position]);
+}
+
+status_t queue_preempt_with(uint8_t position, const motion_command_t *command)
 {
     (void)note_begun();
+    if (estop_port_active()) {
+        return STATUS_ESTOP;
+    }
+    entries[position] = *command;
     preempting = position;
     due = END_NOW;
     (void)queue_poll();
-}
-
-void queue_preempt_with(uint8_t position, const motion_command_t *command)
-{
-    entries[position] = *command;
-    queue_preempt(position);
+    return STATUS_OK;
 }
 
 static bool is_continuous(void)
@@ -264,7 +272,7 @@ void queue_follow(const motion_command_t *command)
         continuous->velocity = command->velocity;
         continuous->accel = command->accel;
         continuous->flags = (uint8_t)((continuous->flags & ~SESSION_FLAGS) | (command->flags & SESSION_FLAGS));
-        queue_preempt(QUEUE_CONTINUOUS);
+        (void)queue_preempt(QUEUE_CONTINUOUS);
     }
 }
 
@@ -279,19 +287,24 @@ void queue_throttle(int8_t rpm)
     faster.velocity = before < least ? 1u : (uint32_t)((int32_t)before + rpm);
     faster.flags &= (uint8_t)~MOTION_CYCLE;
     if (engine_check(&faster) == STATUS_OK) {
-        queue_preempt_with(QUEUE_CONTINUOUS, &faster);
+        (void)queue_preempt_with(QUEUE_CONTINUOUS, &faster);
     }
 }
 
 /* -- loops ------------------------------------------------------------------------------------------------------- */
 
-static void begin_run(run_t what, uint8_t first)
+static status_t begin_run(run_t what, uint8_t first)
 {
     (void)note_begun();
+    if (estop_port_active()) {
+        end_loop();
+        return STATUS_ESTOP;
+    }
     run = what;
     at = first;
     last_of_loop = false;
     (void)offer();
+    return STATUS_OK;
 }
 
 status_t queue_loop_bound(queue_bound_t bound, uint8_t position)
@@ -301,16 +314,16 @@ status_t queue_loop_bound(queue_bound_t bound, uint8_t position)
     }
     bounds[bound] = position;
     if (bounds[1 - bound] != 0 && run != RUN_LOOP) {
-        begin_run(RUN_LOOP, bounds[QUEUE_LOOP_START]);
+        return begin_run(RUN_LOOP, bounds[QUEUE_LOOP_START]);
     }
     return STATUS_OK;
 }
 
-void queue_loop_from_first(uint8_t finish)
+status_t queue_loop_from_first(uint8_t finish)
 {
     bounds[QUEUE_LOOP_START] = QUEUE_FIRST;
     bounds[QUEUE_LOOP_FINISH] = finish;
-    begin_run(RUN_LOOP, QUEUE_FIRST);
+    return begin_run(RUN_LOOP, QUEUE_FIRST);
 }
 
 void queue_loop_passes(uint16_t count)
@@ -337,8 +350,7 @@ status_t queue_array_run(uint16_t count)
     }
     end_loop();
     passes = count;
-    begin_run(RUN_ARRAY, 0);
-    return STATUS_OK;
+    return begin_run(RUN_ARRAY, 0);
 }
 
 void queue_loop_end(void)

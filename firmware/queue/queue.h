@@ -5,7 +5,7 @@
  * in this order: the command that preempts, the next one of the loop or of the xRef array, the oldest pending one. It is
  * offered to the engine, which takes its values when it plans it: until then edits reach it.
  * Context: main loop.
- * Errors:  a status; nothing is changed then.
+ * Errors:  a status; nothing is changed then. While Estop is active what would begin motion is refused (STATUS_ESTOP).
  * Tests:   test/host/test_queue.c, test/image/test_image_processor.c
  * Source:  manual lines 271, 302-371, 485, 553-610, 959; decisions, sections 4 and 5. */
 #ifndef QUEUE_QUEUE_H
@@ -48,8 +48,8 @@ status_t queue_undo(void);
 
 /* Ends the running command at once, as N, and executes `position`; loop and queue go on with what would have come next.
  * 1..30, or QUEUE_CONTINUOUS or QUEUE_ONE_SHOT with the command that it holds from then on. */
-void queue_preempt(uint8_t position);
-void queue_preempt_with(uint8_t position, const motion_command_t *command);
+status_t queue_preempt(uint8_t position);
+status_t queue_preempt_with(uint8_t position, const motion_command_t *command);
 
 /* While the continuous command runs, it goes on with this velocity and acceleration; otherwise nothing. */
 void queue_follow(const motion_command_t *command);
@@ -61,7 +61,7 @@ bool queue_poll(void);
  * running command; may be changed while it runs. autorun: 1 to `finish`, where they may be the same. */
 typedef enum { QUEUE_LOOP_START, QUEUE_LOOP_FINISH } queue_bound_t;
 status_t queue_loop_bound(queue_bound_t bound, uint8_t position);
-void queue_loop_from_first(uint8_t finish);
+status_t queue_loop_from_first(uint8_t finish);
 void queue_loop_passes(uint16_t passes); /* of the loop or array that runs or begins next; 0: endless */
 
 /* The xRef array: entry 0..30, position 1..30 or 0 for its end. queue_array_run(): STATUS_ARRAY_EMPTY. */

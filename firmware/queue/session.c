@@ -6,6 +6,9 @@ session_t session;
 
 void session_init(void)
 {
+    session_set_option(SESSION_SOFT_OPS, settings.soft_ops != 0);
+    session_set_option(SESSION_CRC, settings.crc_mode != 0);
+    session_set_option(SESSION_ACK, settings.acknowledge != 0);
     session.velocity = settings.cycle_us;
     session.flags = MOTION_CYCLE;
     session_set_linear(settings.ramp);
@@ -25,6 +28,14 @@ NOINLINE void session_set_linear(uint8_t linear)
     set_flag(MOTION_LINEAR, linear);
     session.accel = settings.accel[linear];
     session.decel = settings.decel[linear];
+}
+
+void session_set_option(uint8_t option, bool on)
+{
+    session.options |= option;
+    if (!on) {
+        session.options ^= option;
+    }
 }
 
 void session_set_pulses(bool pulses)

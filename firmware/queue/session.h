@@ -17,8 +17,15 @@ typedef struct {
     uint32_t velocity;
     accel_code_t accel;
     accel_code_t decel;
-    uint8_t flags; /* MOTION_CYCLE, MOTION_LINEAR, MOTION_PULSES; the other bits stay clear */
+    uint8_t flags;   /* MOTION_CYCLE, MOTION_LINEAR, MOTION_PULSES; the other bits stay clear */
+    uint8_t options; /* SESSION_... */
 } session_t;
+
+enum {
+    SESSION_SOFT_OPS = 1 << 0, /* $O */
+    SESSION_CRC = 1 << 1,      /* $H */
+    SESSION_ACK = 1 << 2,      /* $K */
+};
 
 #define SESSION_FLAGS (MOTION_CYCLE | MOTION_LINEAR | MOTION_PULSES)
 
@@ -28,6 +35,8 @@ void session_init(void); /* from the settings */
 
 /* Selects the ramp, 0 harmonic, 1 linear; accel and decel become the system defaults of that ramp (LIN-013). */
 void session_set_linear(uint8_t linear);
+
+void session_set_option(uint8_t option, bool on);
 
 /* Counts are pulses (true) or full steps. */
 void session_set_pulses(bool pulses);

@@ -296,10 +296,23 @@ static void test_a_line_that_begins_with_a_number_is_not_executed(void)
     assert_refused(STATUS_NOT_YET, "0");
 }
 
-static void test_commands_of_later_versions_say_that_they_are_not_available(void)
+/* OPS-006, SYS-006, SYS-007, SYS-013 */
+static void test_options_of_the_session_are_switched(void)
 {
-    TEST_ASSERT_EQUAL(STATUS_NOT_YET, execute("$H0"));
-    TEST_ASSERT_EQUAL(STATUS_NOT_YET, execute("$K0"));
+    static const struct {
+        const char *line;
+        uint8_t option;
+        bool on;
+    } switched[] = {{"$O1", SESSION_SOFT_OPS, true}, {"$O", SESSION_SOFT_OPS, true}, {"$O0", SESSION_SOFT_OPS, false},
+                    {"$H0", SESSION_CRC, false},     {"$H", SESSION_CRC, true},      {"$H0", SESSION_CRC, false},
+                    {"$H5", SESSION_CRC, true},      {"$K0", SESSION_ACK, false},    {"$K", SESSION_ACK, true}};
+    for (size_t i = 0; i < sizeof switched / sizeof switched[0]; i++) {
+        const uint8_t others = session.options & (uint8_t)~switched[i].option;
+        TEST_ASSERT_EQUAL_MESSAGE(STATUS_OK, execute(switched[i].line), switched[i].line);
+        TEST_ASSERT_EQUAL_HEX8(others | (switched[i].on ? switched[i].option : 0), session.options);
+    }
+    TEST_ASSERT_EQUAL(STATUS_RANGE, execute("$O2"));
+    TEST_ASSERT_EQUAL(STATUS_SYNTAX, execute("$Kx"));
 }
 
 /* What the engine is offered is begun, and its count told; 0: there is nothing. */
@@ -507,7 +520,7 @@ int main(void)
     RUN_TEST(test_each_wrong_line_is_refused_and_changes_nothing);
     RUN_TEST(test_a_wrong_ramp_number_is_refused_with_the_range);
     RUN_TEST(test_a_line_that_begins_with_a_number_is_not_executed);
-    RUN_TEST(test_commands_of_later_versions_say_that_they_are_not_available);
+    RUN_TEST(test_options_of_the_session_are_switched);
     RUN_TEST(test_loops_are_set_up_by_l_and_a_letter);
     RUN_TEST(test_xref_executes_entries_and_its_array);
     RUN_TEST(test_a_one_shot_takes_the_session_defaults_and_leaves_them);

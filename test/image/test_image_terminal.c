@@ -702,7 +702,7 @@ static void test_velocity_0_is_named(void)
 
 static void test_what_this_version_lacks_is_named(void)
 {
-    static const char *const lines[] = {"$H0", "$K1", "$O1"};
+    static const char *const lines[] = {"85m200", "0"};
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++)
         assert_refused(lines[i], "?9 not available");
 }

@@ -1,7 +1,10 @@
 #include "host/fakes/engine_fake.h"
 #include <string.h>
 #include "boot.h"
+#include "cli/terminal_port.h"
 #include "host/fakes/terminal_port_fake.h"
+#include "motion/estop_port.h"
+#include "queue/ops_port.h"
 #include "settings.h"
 
 engine_fake_t engine_fake;
@@ -141,4 +144,29 @@ uint8_t engine_faults(void)
 void boot_restart(void)
 {
     engine_fake.restarts++;
+}
+
+bool estop_port_active(void)
+{
+    return engine_fake.estop;
+}
+
+uint8_t engine_commands_played(void)
+{
+    return engine_fake.played;
+}
+
+void ops_port_set(bool executing)
+{
+    size_t length = strlen(engine_fake.ops);
+    if (length + 1 < sizeof engine_fake.ops) {
+        engine_fake.ops[length] = executing ? '1' : '0';
+    }
+}
+
+void ops_port_send(uint8_t byte)
+{
+    if (terminal_port_free() != 0) {
+        terminal_port_put(byte);
+    }
 }

@@ -14,11 +14,12 @@ typedef struct {
     /* what the test sets */
     bool accepts;    /* it begins what it is offered at once, as at standstill; otherwise engine_fake_begin() does */
     bool cannot_end; /* engine_next() comes at a moment when nothing can be cut */
+    bool estop;      /* estop_port_active() */
     motion_state_t state;
     int32_t position;
     uint32_t rpm, cycle_us; /* engine_velocity() */
     uint8_t faults;
-    uint8_t ended;
+    uint8_t ended, played;
     /* what was asked */
     const motion_command_t *offered; /* and not begun */
     uint8_t begun;
@@ -30,6 +31,7 @@ typedef struct {
     accel_code_t graceful_decel;
     bool graceful_linear;
     unsigned pulses_cw, pulses_ccw;
+    char ops[100]; /* ops_port_set(): 1 and 0, one after the other */
     bool gap;
     /* bytes that the port had been given when the last command was submitted (terminal_port_fake) */
     unsigned sent_at_submit;

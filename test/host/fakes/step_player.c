@@ -1,4 +1,6 @@
 #include "host/fakes/step_player.h"
+#include "motion/engine.h"
+#include "motion/estop_port.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -595,3 +597,10 @@ uint16_t step_port_shorten(uint8_t offset, uint16_t periods)
     }
     return (uint16_t)dropped;
 }
+
+bool estop_port_active(void)
+{
+    return false;
+}
+
+void engine_on_start(void) {}

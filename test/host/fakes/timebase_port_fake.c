@@ -12,5 +12,5 @@ uint32_t timebase_us(void)
 
 uint8_t timebase_32ms(void)
 {
-    return (uint8_t)(timebase_fake_us >> 18);
+    return (uint8_t)(timebase_fake_us >> 15);
 }
