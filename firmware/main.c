@@ -18,7 +18,8 @@
 #include "queue/queue.h"
 #include "settings.h"
 
-static status_t snapshot; /* what became of the saved queue */
+static status_t snapshot; /* what became of the saved queue ... */
+static bool saved;        /* ... and whether there is one */
 
 void boot_restart(void)
 {
@@ -33,7 +34,7 @@ void boot_start(void)
 {
     boot_restart();
     queue_init();
-    snapshot = queue_restore();
+    snapshot = queue_restore(&saved);
 }
 
 void boot_restore_factory(void)
@@ -65,7 +66,7 @@ int main(void)
         if (boot_over()) {
             if (!started) {
                 started = true;
-                if (boot_autorun_allowed() && snapshot == STATUS_OK && settings.autorun != 0) {
+                if (boot_autorun_allowed() && saved && settings.autorun != 0) {
                     (void)queue_loop_from_first(settings.autorun);
                 }
             }

@@ -261,7 +261,8 @@ static status_t command_save(const char *rest)
 static status_t command_restore(const char *rest)
 {
     (void)rest;
-    return queue_restore();
+    bool saved;
+    return queue_restore(&saved);
 }
 
 static status_t command_undo(const char *rest)

@@ -170,8 +170,9 @@ void queue_save(void)
     store_save_queue(&entries[QUEUE_FIRST]);
 }
 
-status_t queue_restore(void)
+status_t queue_restore(bool *saved)
 {
+    *saved = false;
     if (store_busy()) {
         return STATUS_WAIT;
     }
@@ -185,6 +186,7 @@ status_t queue_restore(void)
         queue_clear();
         session = kept;
     }
+    *saved = found == STORE_QUEUE_SAVED;
     undo_position = 0;
     return STATUS_OK;
 }

@@ -34,7 +34,7 @@ void queue_clear(void);
 /* Saves the entries 1..30 in the background (eeprom/store.h), and gets them back: the last snapshot, or system defaults
  * if none was ever saved. STATUS_WAIT: something is being written; STATUS_SNAPSHOT: it is damaged, nothing is changed. */
 void queue_save(void);
-status_t queue_restore(void);
+status_t queue_restore(bool *saved); /* whether there was a snapshot */
 
 /* Stores a command that engine_check() passed at the next available position and makes it pending.
  * STATUS_QUEUE_FULL when all 30 are. */

@@ -288,12 +288,10 @@ static void test_after_a_watchdog_reset_its_cause_is_reported_and_nothing_moves(
 static void test_after_them_nothing_restores(void)
 {
     static const board_reset_t causes[] = {BOARD_RESET_BROWN_OUT, BOARD_RESET_WATCHDOG};
-    uint16_t main_at;
-    TEST_ASSERT_TRUE(board_symbol(board, "main", &main_at));
     for (unsigned i = 0; i < 2; i++) {
         board_pin_drive(board, RST, 0);
         board_reset(board, causes[i]);
-        board_run_to_pc(board, main_at, SECOND);
+        image_load_settings();
         IMAGE_SET(cycle_us, 2000);
         image_send("\x1B\x1B\x1B");
         image_prompt();

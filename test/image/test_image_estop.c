@@ -273,8 +273,8 @@ static void test_while_estop_is_low_motion_is_refused_and_nothing_restarts_after
     image_assert_no_pulse_for(SECOND);
     image_send("\r");
     image_run(50 * MS);
-    image_assert_holds(image_take_text(), "?15 Estop");
-    image_refused("m100v100", "?15 Estop");
+    image_assert_holds(image_take_text(), "?19 Estop");
+    image_refused("m100v100", "?19 Estop");
     image_send("++-");
     image_do("v200"); /* what is no motion is accepted */
     image_do("N");
@@ -296,7 +296,7 @@ static void test_estop_that_is_low_at_boot_is_active(void)
     image_power_on();
     board_pin_drive(board, ESTOP, 0);
     image_prompt();
-    image_refused("m100v100", "?15 Estop");
+    image_refused("m100v100", "?19 Estop");
     board_pin_drive(board, ESTOP, 1);
     image_do("m10v100a1d1");
     image_idle(LONG_WAIT);

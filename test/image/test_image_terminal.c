@@ -84,7 +84,7 @@ static void test_the_unit_greets_with_its_version_and_the_prompt(void)
 {
     image_off();
     image_power_on();
-    image_run(200 * MS);
+    image_run(SECOND + 200 * MS);
     const char *seen = image_take_text();
     if (strncmp(seen, "SAC ", 4) != 0 || strlen(seen) < 10 || strcmp(seen + strlen(seen) - 6, "\r\nSAC>") != 0)
         image_fail("expected \"SAC <version> <date>\\r\\nSAC>\", saw \"%s\"", seen);
@@ -474,7 +474,7 @@ static void test_a_reset_restores_the_system_defaults(void)
     image_do("v222");
     image_do("$P");
     board_reset(board, BOARD_RESET_EXTERNAL);
-    image_run(200 * MS);
+    image_run(SECOND + 200 * MS);
     image_assert_holds(image_display("cf"), "v 100 cycle 3000\r\na 1.00 d 1.00 harmonic");
     image_assert_holds(image_display("cf"), "full step");
 }
