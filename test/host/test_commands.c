@@ -5,6 +5,7 @@
 #include "host/fakes/engine_fake.h"
 #include "host/fakes/terminal_port_fake.h"
 #include "host/fakes/timebase_port_fake.h"
+#include "queue/ops.h"
 #include "queue/queue.h"
 #include "queue/session.h"
 #include "unity.h"
@@ -303,12 +304,43 @@ static void test_a_line_that_begins_with_a_number_is_not_executed(void)
 
 static void test_commands_of_later_versions_say_that_they_are_not_available(void)
 {
-    static const char *const lines[] = {"x", "xm200", "x3", "l", "L5", "ls1", "y", "z", "cc", "qs", "q9m200"};
+    static const char *const lines[] = {"x", "xm200", "x3", "l", "L5", "ls1", "z", "cc", "qs", "q9m200"};
     for (unsigned i = 0; i < sizeof lines / sizeof lines[0]; i++) {
         assert_refused(STATUS_NOT_YET, lines[i]);
     }
     TEST_ASSERT_EQUAL(STATUS_NOT_YET, execute("$R"));
     TEST_ASSERT_EQUAL(STATUS_NOT_YET, execute("$Cb2000"));
+}
+
+/* SYN-002, SYN-008 */
+static void test_y_releases_what_is_held(void)
+{
+    assert_refused(STATUS_UNKNOWN_COMMAND, "Y");
+    TEST_ASSERT_EQUAL(0, engine_fake.releases);
+    TEST_ASSERT_EQUAL(STATUS_OK, execute("y"));
+    TEST_ASSERT_EQUAL(1, engine_fake.releases);
+}
+
+/* OPS-006, SYS-010 */
+static void test_soft_ops_are_switched_for_the_session(void)
+{
+    TEST_ASSERT_EQUAL(STATUS_OK, execute("$O1"));
+    TEST_ASSERT_TRUE(ops_soft());
+    TEST_ASSERT_EQUAL(STATUS_OK, execute("$O"));
+    TEST_ASSERT_TRUE(ops_soft());
+    TEST_ASSERT_EQUAL(STATUS_OK, execute("$O0"));
+    TEST_ASSERT_FALSE(ops_soft());
+    TEST_ASSERT_EQUAL(STATUS_RANGE, execute("$O2"));
+}
+
+/* EST-001: motion is refused while Estop is active */
+static void test_while_estop_is_active_no_motion_is_accepted(void)
+{
+    engine_fake.estop = true;
+    TEST_ASSERT_EQUAL(STATUS_ESTOP, execute("m200"));
+    TEST_ASSERT_EQUAL(0, queue_pending());
+    TEST_ASSERT_EQUAL(0, engine_fake.submitted_count);
+    TEST_ASSERT_EQUAL(STATUS_OK, execute("v50"));
 }
 
 /* TRM-005, TRM-017 */
@@ -355,6 +387,9 @@ int main(void)
     RUN_TEST(test_a_wrong_ramp_number_is_refused_with_the_range);
     RUN_TEST(test_a_line_that_begins_with_a_number_is_not_executed);
     RUN_TEST(test_commands_of_later_versions_say_that_they_are_not_available);
+    RUN_TEST(test_y_releases_what_is_held);
+    RUN_TEST(test_soft_ops_are_switched_for_the_session);
+    RUN_TEST(test_while_estop_is_active_no_motion_is_accepted);
     RUN_TEST(test_a_space_ends_the_command_and_a_leading_one_makes_it_blank);
     RUN_TEST(test_too_many_displays_at_once_are_refused);
     return UNITY_END();

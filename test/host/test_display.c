@@ -179,7 +179,8 @@ static void test_the_list_has_one_line_for_each_available_command(void)
     const char *text = shown("?");
     static const char *const forms[] = {"m[-]n", "vd", "v[n] vc<n>", "a[n.nn]", "d[n.nn]", "+",  "-",
                                         "S",     "s",  "N",          "n",       "q",       "cf", "p",
-                                        "g",     "b",  "?",          "$L0 $L1", "$F",      "$P", "$U"};
+                                        "g",     "b",  "?",          "y",       "$L0 $L1", "$F", "$P",
+                                        "$U",    "$O0 $O1"};
     unsigned lines = 0;
     for (const char *c = text; *c != '\0'; c++) {
         lines += *c == '\n';

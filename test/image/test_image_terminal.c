@@ -702,7 +702,7 @@ static void test_velocity_0_is_named(void)
 
 static void test_what_this_version_lacks_is_named(void)
 {
-    static const char *const lines[] = {"m", "m-", "m0",   "m-0", "mv100", "l",  "ls1", "LA",  "x1",  "xm5", "y",
+    static const char *const lines[] = {"m", "m-", "m0",   "m-0", "mv100", "l",  "ls1", "LA",  "x1",  "xm5",
                                         "z", "cc", "q9m5", "qs",  "$C",    "$E", "$H0", "$K1", "$O1", "$R",  "$n"};
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++)
         assert_refused(lines[i], "?9 not available");
