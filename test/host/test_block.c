@@ -107,7 +107,7 @@ static void test_fractions_are_carried_from_run_to_run_and_on(void)
 /* CLK-002 */
 static void test_short_periods_are_not_split_and_reloaded_early(void)
 {
-    static const uint8_t intervals[] = {32, 39, 40, 47, 48, 83, 84, 127};
+    static const uint8_t intervals[] = {32, 39, 40, 47, 48, 81, 82, 127};
     for (uint8_t i = 0; i < sizeof intervals; i++) {
         setUp();
         block.top_q16 = (((uint32_t)intervals[i] - 1u) << 16) + 0x8001;

@@ -589,6 +589,25 @@ static void test_what_is_executing_is_not_taken_back(void)
     TEST_ASSERT_EQUAL_UINT8(1, queue_next_position());
 }
 
+/* EST-001: refused, nothing changed, whatever would begin motion */
+static void test_while_estop_is_active_nothing_begins(void)
+{
+    const motion_command_t command = *queue_entry(QUEUE_FIRST);
+    engine_fake.estop = true;
+    TEST_ASSERT_EQUAL(STATUS_ESTOP, queue_add(&command));
+    TEST_ASSERT_EQUAL(STATUS_ESTOP, queue_preempt(3));
+    TEST_ASSERT_EQUAL(STATUS_ESTOP, queue_preempt_with(QUEUE_ONE_SHOT, &command));
+    (void)queue_loop_bound(QUEUE_LOOP_START, 1);
+    TEST_ASSERT_EQUAL(STATUS_ESTOP, queue_loop_bound(QUEUE_LOOP_FINISH, 2));
+    queue_array_set(0, 1);
+    TEST_ASSERT_EQUAL(STATUS_ESTOP, queue_array_run(1));
+    TEST_ASSERT_EQUAL(0, queue_pending());
+    (void)queue_poll();
+    engine_fake.estop = false;
+    (void)queue_poll();
+    TEST_ASSERT_EQUAL(0, engine_fake.submitted_count);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -631,5 +650,6 @@ int main(void)
     RUN_TEST(test_an_array_shortened_while_it_runs_begins_anew);
     RUN_TEST(test_undo_takes_back_one_command_or_edit);
     RUN_TEST(test_what_is_executing_is_not_taken_back);
+    RUN_TEST(test_while_estop_is_active_nothing_begins);
     return UNITY_END();
 }

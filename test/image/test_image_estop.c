@@ -36,6 +36,7 @@ static void boot(unsigned baud, unsigned ustep, unsigned pulse_us)
 /* What a child has seen. */
 typedef struct {
     bool done;
+    uint64_t longest;  /* pulse */
     int64_t last_rise; /* after the edge, cycles; negative: before it */
     char wrong[200];
 } seen_t;
@@ -54,10 +55,12 @@ static void watch(seen_t *seen, uint64_t phase, unsigned how, uint64_t width)
     /* The wait for a rise that comes too late. */
     if (train.count != made)
         seen->last_rise = (int64_t)train.last_rise - (int64_t)edge;
+    seen->longest = train.high_max;
     if (board_pin_level(board, CLK))
         snprintf(seen->wrong, sizeof seen->wrong, "clk stays high");
-    if (made && train.high_min < width)
-        snprintf(seen->wrong, sizeof seen->wrong, "a pulse of %llu cycles", (unsigned long long)train.high_min);
+    if (made && (train.high_min < width || train.high_max > width + 12 * US)) /* longer by what the books take */
+        snprintf(seen->wrong, sizeof seen->wrong, "pulses of %llu to %llu cycles", (unsigned long long)train.high_min,
+                 (unsigned long long)train.high_max);
     if ((how & WITH_POSITION) && phase % 4 == 0) {
         unsigned faults;
         int32_t shown = image_position_and_faults(&faults);
@@ -87,16 +90,20 @@ static int64_t worst_of(const char *name, unsigned phases, unsigned how, uint64_
     }
     int64_t worst = INT64_MIN;
     unsigned at = 0;
+    uint64_t longest = 0;
     for (unsigned i = 0; i < phases; i++) {
         if (!seen[i].done || seen[i].wrong[0])
             image_fail("%s, phase %u: %s", name, i, seen[i].done ? seen[i].wrong : "failed");
+        if (seen[i].longest > longest)
+            longest = seen[i].longest;
         if (seen[i].last_rise > worst) {
             worst = seen[i].last_rise;
             at = i;
         }
     }
     munmap(seen, phases * sizeof *seen);
-    printf("Estop to last rise, %s: \t%lld cycles (phase %u of %u)\n", name, (long long)worst, at, phases);
+    printf("Estop to last rise, %s: \t%lld cycles (phase %u of %u); longest pulse %llu of %llu\n", name,
+           (long long)worst, at, phases, (unsigned long long)longest, (unsigned long long)width);
     return worst;
 }
 
