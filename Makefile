@@ -91,7 +91,9 @@ test_property_planner_SRCS := $(ENGINE_SRCS) test/host/motion_exact.c
 AVR_TESTS := test_number test_line test_session test_wide test_block test_ramp test_profile
 
 # Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
-IMAGE_TESTS := test_image_motion test_image_queue test_image_terminal test_image_stop test_image_timing test_image_stress
+IMAGE_TESTS := test_image_motion test_image_queue test_image_terminal test_image_stop test_image_timing test_image_stress \
+    test_image_processor
+test_image_processor_SRCS := test/image/processor_model.c
 # What every whole-image test is linked with.
 IMAGE_COMMON_SRCS := test/image/image.c test/image/model.c
 
@@ -317,6 +319,11 @@ test-known-failures: ## the tests that this version is known to fail, left out o
 test-long: ## ten million mixed steps with the terminal busy (some minutes); `make test` makes a million
 	@$(MAKE) -s --no-print-directory $(BUILD)/image/test_image_stress $(BUILD)/sac.hex
 	@SAC_STEPS=10000000 $(BUILD)/image/test_image_stress
+
+.PHONY: test-processor
+test-processor: ## 2,000 random scripts on the image and on the model of the command processor
+	@$(MAKE) -s --no-print-directory $(BUILD)/image/test_image_processor $(BUILD)/sac.hex
+	@SAC_SCRIPTS=$${SAC_SCRIPTS:-2000} $(BUILD)/image/test_image_processor
 
 .PHONY: test-scripts
 test-scripts: ## the simulator program as its user sees it, and the scripts that check the build
