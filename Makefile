@@ -62,7 +62,7 @@ FIRMWARE_SRCS := \
 # needed on the host alone, and assembler on the AVR alone.
 
 HOST_TESTS := test_number test_status test_baud test_line test_session test_queue test_motion_syntax test_commands \
-    test_display test_terminal test_wide test_block test_ramp test_profile test_engine test_property_planner
+    test_display test_terminal test_wide test_block test_ramp test_profile test_engine test_property_planner test_processor_model
 FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 CLI_SRCS := firmware/cli/commands.c firmware/cli/display.c firmware/cli/text.c firmware/cli/motion_syntax.c \
     firmware/base/number.c firmware/queue/queue.c firmware/queue/session.c firmware/settings.c $(FAKE_SRCS)
@@ -85,6 +85,7 @@ test_profile_SRCS := firmware/motion/profile.c $(RAMP_SRCS)
 ENGINE_SRCS := firmware/motion/engine.c firmware/motion/block.c firmware/motion/profile.c firmware/motion/ramp.c firmware/settings.c \
     test/host/fakes/step_player.c
 test_engine_SRCS := $(ENGINE_SRCS)
+test_processor_model_SRCS := test/image/processor_model.c
 test_property_planner_SRCS := $(ENGINE_SRCS) test/host/motion_exact.c
 
 # Arithmetic that is tested on the AVR as well: the same source, compiled by avr-gcc, run on the simulated board.

@@ -12,7 +12,7 @@
 
 /* Bounds in time, each with a margin above what was measured. */
 #define TAKES (3 * MS)    /* what goes in has taken effect, unless a command ends meanwhile */
-#define STOPS (2 * MS)    /* the same for S and Estop */
+#define STOPS (3 * MS)    /* S and Estop; the planner may be at work when they come */
 #define JOINS (14 * MS)   /* a command that ends within this time may be over first, and the next one taken up */
 #define TAIL (4 * MS)     /* pulses that were planned when a command was cut: those of this time, and some more */
 #define TAIL_PULSES 7
@@ -966,6 +966,8 @@ bool processor_line(processor_t *p, uint64_t cycle, const char *line)
         return false;
     if (in.kind == STOP_NOW || in.kind == RELEASE)
         in.joins = 0;
+    if (in.kind == STOP_NOW)
+        in.takes = STOPS;
     put_in(p, &in);
     return true;
 }
@@ -986,7 +988,7 @@ void processor_estop(processor_t *p, uint64_t cycle, int level)
     memset(&in, 0, sizeof in);
     in.kind = ESTOP;
     in.cycle = cycle;
-    in.takes = TAKES;
+    in.takes = STOPS;
     in.number = level != 0;
     put_in(p, &in);
 }
