@@ -176,6 +176,16 @@ static void test_plus_and_minus_are_a_pulse_each_at_rest_only(void)
     rests();
 }
 
+static void test_the_31st_command_takes_the_first_position_again(void)
+{
+    for (int n = 1; n <= 31; n++) {
+        type(n % 2 ? "m1" : "m-1");
+        plays(n % 2 ? 1 : -1, END);
+        rests();
+    }
+    TEST_ASSERT_EQUAL(2, processor_next_position(p));
+}
+
 /* -- stop and next ------------------------------------------------------------------------------------------------- */
 
 static void test_capital_s_ends_all_at_once(void)
@@ -611,6 +621,7 @@ int main(void)
     RUN_TEST(test_extra_pulses_are_added_and_omitted_parameters_come_from_the_session);
     RUN_TEST(test_a_start_wait_delays_and_is_forgotten);
     RUN_TEST(test_plus_and_minus_are_a_pulse_each_at_rest_only);
+    RUN_TEST(test_the_31st_command_takes_the_first_position_again);
     RUN_TEST(test_capital_s_ends_all_at_once);
     RUN_TEST(test_capital_n_cuts_the_running_command_only);
     RUN_TEST(test_small_n_ramps_down_with_the_commands_deceleration);

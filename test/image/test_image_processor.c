@@ -570,6 +570,94 @@ static void test_random_scripts_make_the_pulses_that_the_model_of_the_command_pr
         run_script(i);
 }
 
+/* -- what scripts have found, each alone ------------------------------------------------------------------------- */
+
+/* Both lines back to back, so many us after the one before; returns when the motor stands. */
+static void type_both(const char *first, const char *second, uint32_t us)
+{
+    while (board_uart_sending(board))
+        image_run(5 * US);
+    image_run(us * US);
+    image_send(first);
+    image_send("\r");
+    image_send(second);
+    image_send("\r");
+    image_sent();
+    image_idle(5 * SECOND);
+}
+
+/* NXT-001, NXT-002, SWT-007 */
+static void test_a_command_behind_the_end_of_a_start_wait_is_executed(void)
+{
+    static const char *const ends[] = {"S", "s", "N", "n"};
+    for (size_t i = 0; i < 4; i++) {
+        for (uint32_t us = 0; us < 12000; us += 1000) {
+            image_boot();
+            image_send("m7vc500a999d999t30000\r");
+            type_both(ends[i], "m-16vc500a999d999", us);
+            if (train.count != 16)
+                image_fail("%s %u us after the command that waits: expected 16 pulses, saw %zu", ends[i], us,
+                           train.count);
+            image_off();
+        }
+    }
+}
+
+/* NXT-001 */
+static void test_next_in_a_start_wait_goes_on_with_what_is_pending(void)
+{
+    image_boot();
+    image_send("m7vc500a999d999t30000\rm-16vc500a999d999\r");
+    type_both("N", "g", 3000);
+    image_assert_pulses(16);
+}
+
+/* STO-001 */
+static void test_a_stop_between_two_pulses_of_two_keeps_the_position(void)
+{
+    image_boot();
+    image_send("m2vc1100a999d999\r");
+    type_both("S", "g", 0);
+    TEST_ASSERT_EQUAL(train.position, image_position());
+}
+
+/* MOT-011 */
+static void test_extra_pulses_behind_two_steps_have_the_same_interval(void)
+{
+    image_boot();
+    image_do("m2v300a999d999u3");
+    image_idle(5 * SECOND);
+    image_assert_intervals(0, 4, 1000 * US, 1);
+}
+
+/* STO-004: at any moment before and after the joint of two commands of opposite direction. */
+static void test_small_s_at_a_joint_ends_all_and_keeps_position_and_direction(void)
+{
+    static const char *const waits[] = {"", "t15000"};
+    for (size_t i = 0; i < 2; i++) {
+        for (uint32_t us = 0; us < 20000; us += 500) {
+            char line[60];
+            image_boot();
+            IMAGE_SET(slow_rpm, 100);
+            image_send("m-23vc400a200d999\r");
+            snprintf(line, sizeof line, "m40vc600a999d50%s\r", waits[i]);
+            image_send(line);
+            image_sent();
+            image_until_pulses(5, SECOND);
+            image_run(us * US);
+            image_do("s");
+            image_idle(5 * SECOND);
+            if (train.count > 23 + 25)
+                image_fail("s %u us later: expected the second command not to run to its end, saw %zu pulses", us,
+                           train.count);
+            if (image_position() != train.position)
+                image_fail("s %u us later: expected position %lld as the edges say, saw %ld", us,
+                           (long long)train.position, (long)image_position());
+            image_off();
+        }
+    }
+}
+
 int main(void)
 {
     features = FEATURES;
@@ -580,5 +668,12 @@ int main(void)
             features |= groups[i].bit;
     UNITY_BEGIN();
     RUN_TEST(test_random_scripts_make_the_pulses_that_the_model_of_the_command_processor_expects);
+    if (getenv("SAC_KNOWN_FAILURES")) { /* fail in this version: docs/design.md, known failures */
+        RUN_TEST(test_a_command_behind_the_end_of_a_start_wait_is_executed);
+        RUN_TEST(test_next_in_a_start_wait_goes_on_with_what_is_pending);
+        RUN_TEST(test_a_stop_between_two_pulses_of_two_keeps_the_position);
+        RUN_TEST(test_extra_pulses_behind_two_steps_have_the_same_interval);
+        RUN_TEST(test_small_s_at_a_joint_ends_all_and_keeps_position_and_direction);
+    }
     return UNITY_END();
 }
