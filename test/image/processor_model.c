@@ -666,8 +666,8 @@ static void close_set(processor_t *p, uint64_t cycle)
         }
         if (!w.now.present) {
             world_t begun = w;
-            if (take_up(p, &begun))
-                add(p, &begun);
+            take_up(p, &begun); /* or the loop is over and forgotten */
+            add(p, &begun);
         }
     }
 }
