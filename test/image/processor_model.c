@@ -651,11 +651,10 @@ static void close_set(processor_t *p, uint64_t cycle)
                 applied.inputs++;
                 apply(p, &applied, in, (early ? in->cycle : p->last_rise) + in->takes + TAIL);
                 add(p, &applied);
-                bool ignored = in->kind == SINGLE && !w.now.present && in->cycle <= w.moving_until;
-                if (ignored) {
-                    w.inputs++;
-                    add(p, &w);
-                    continue;
+                if (in->kind == SINGLE && !w.now.present && in->cycle <= w.moving_until) {
+                    applied = w; /* ignored */
+                    applied.inputs++;
+                    add(p, &applied);
                 }
             }
         }
