@@ -15,7 +15,7 @@
 #define STOPS (3 * MS)    /* S and Estop; the planner may be at work when they come */
 #define JOINS (14 * MS)   /* a command that ends within this time may be over first, and the next one taken up */
 #define TAIL (4 * MS)     /* pulses that were planned when a command was cut: those of this time, and some more */
-#define TAIL_PULSES 7
+#define TAIL_PULSES 13
 #define LATE_START (1000 * US)
 #define STARTS (12 * MS)  /* a command begins within this time */
 #define SLACK (6 * MS)    /* a pulse is missing when it is this late */
