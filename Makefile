@@ -76,7 +76,7 @@ FIRMWARE_SRCS := \
 
 HOST_TESTS := test_number test_status test_baud test_line test_settings test_store test_session test_queue \
     test_encoder test_ops test_motion_syntax test_commands test_configure test_display test_terminal test_boot test_drivers \
-    test_wide test_block test_ramp test_profile test_engine test_property_planner
+    test_wide test_block test_ramp test_profile test_engine test_property_planner test_processor_model
 FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 STORE_SRCS := firmware/eeprom/store.c firmware/base/crc16.c firmware/settings.c test/host/fakes/eeprom_port_fake.c
 CLI_SRCS := firmware/cli/commands.c firmware/cli/configure.c firmware/cli/display.c firmware/cli/text.c firmware/cli/motion_syntax.c \
@@ -109,14 +109,17 @@ test_profile_SRCS := firmware/motion/profile.c $(RAMP_SRCS)
 ENGINE_SRCS := firmware/drivers.c firmware/motion/engine.c firmware/motion/block.c firmware/motion/profile.c firmware/motion/ramp.c firmware/settings.c \
     test/host/fakes/step_player.c
 test_engine_SRCS := $(ENGINE_SRCS)
+test_processor_model_SRCS := test/image/processor_model.c
 test_property_planner_SRCS := $(ENGINE_SRCS) test/host/motion_exact.c
 
 # Arithmetic that is tested on the AVR as well: the same source, compiled by avr-gcc, run on the simulated board.
 AVR_TESTS := test_number test_line test_session test_wide test_block test_ramp test_profile
 
 # Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
-IMAGE_TESTS := test_image_boot test_image_pins test_image_encoder test_image_motion test_image_queue test_image_sequence test_image_terminal test_image_stop \
-    test_image_configure test_image_timing test_image_stress test_image_estop test_image_ops
+IMAGE_TESTS := test_image_boot test_image_pins test_image_encoder test_image_motion test_image_queue \
+    test_image_sequence test_image_terminal test_image_stop test_image_configure test_image_timing test_image_stress \
+    test_image_estop test_image_ops test_image_processor
+test_image_processor_SRCS := test/image/processor_model.c
 # What every whole-image test is linked with.
 IMAGE_COMMON_SRCS := test/image/image.c test/image/model.c
 
