@@ -62,7 +62,7 @@ FIRMWARE_SRCS := \
 # needed on the host alone, and assembler on the AVR alone.
 
 HOST_TESTS := test_number test_status test_baud test_line test_session test_queue test_motion_syntax test_commands \
-    test_display test_terminal test_wide test_block test_ramp test_profile test_engine test_property_planner
+    test_display test_terminal test_fuzz test_wide test_block test_ramp test_profile test_engine test_property_planner
 FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 CLI_SRCS := firmware/cli/commands.c firmware/cli/display.c firmware/cli/text.c firmware/cli/motion_syntax.c \
     firmware/base/number.c firmware/queue/queue.c firmware/queue/session.c firmware/settings.c $(FAKE_SRCS)
@@ -76,6 +76,8 @@ test_motion_syntax_SRCS := firmware/cli/motion_syntax.c firmware/base/number.c f
 test_commands_SRCS := $(CLI_SRCS)
 test_display_SRCS := $(CLI_SRCS)
 test_terminal_SRCS := $(CLI_SRCS) firmware/cli/terminal.c firmware/cli/line.c firmware/base/status.c
+test_fuzz_SRCS := $(test_terminal_SRCS)
+test_fuzz_HOST_SRCS := test/fuzz/grammar.c test/fuzz/reference.c
 test_wide_SRCS := firmware/base/wide.S
 test_block_SRCS := firmware/motion/block.c firmware/motion/block.S
 RAMP_SRCS := firmware/motion/ramp.c firmware/base/wide.S
@@ -317,6 +319,16 @@ test-known-failures: ## the tests that this version is known to fail, left out o
 test-long: ## ten million mixed steps with the terminal busy (some minutes); `make test` makes a million
 	@$(MAKE) -s --no-print-directory $(BUILD)/image/test_image_stress $(BUILD)/sac.hex
 	@SAC_STEPS=10000000 $(BUILD)/image/test_image_stress
+
+# The same lines without the sanitizers, several times as fast.
+$(BUILD)/fuzz: test/host/test_fuzz.c $(test_fuzz_SRCS) $(test_fuzz_HOST_SRCS) $(BUILD)/unity.o $(HOST_HEADERS) Makefile
+	$(call say,CC  $@)
+	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O2 -flto $(UNITY_FLAGS) $(TEST_INCLUDES) -o $@ $(filter %.c %.o,$^) -lm
+
+.PHONY: fuzz-long
+fuzz-long: ## 10^8 damaged lines into the terminal on this machine; SAC_FUZZ_SEED=n makes others, SAC_FUZZ_LINES=n fewer
+	@$(MAKE) -s --no-print-directory $(BUILD)/fuzz
+	@SAC_FUZZ_LINES=$${SAC_FUZZ_LINES:-100000000} $(BUILD)/fuzz
 
 .PHONY: test-scripts
 test-scripts: ## the simulator program as its user sees it, and the scripts that check the build
