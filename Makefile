@@ -93,9 +93,11 @@ test_property_planner_SRCS := $(ENGINE_SRCS) test/host/motion_exact.c
 AVR_TESTS := test_number test_line test_session test_wide test_block test_ramp test_profile
 
 # Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
-IMAGE_TESTS := test_image_motion test_image_queue test_image_terminal test_image_stop test_image_timing test_image_stress
+IMAGE_TESTS := test_image_motion test_image_queue test_image_terminal test_image_stop test_image_timing test_image_stress \
+    test_image_fuzz
 # What every whole-image test is linked with.
 IMAGE_COMMON_SRCS := test/image/image.c test/image/model.c
+test_image_fuzz_SRCS := test/fuzz/grammar.c test/fuzz/reference.c firmware/settings.c
 
 # Tests written in Python.
 SCRIPT_TESTS := test/tools/test_tools.py test/sim/test_sacsim.py
@@ -329,6 +331,11 @@ $(BUILD)/fuzz: test/host/test_fuzz.c $(test_fuzz_SRCS) $(test_fuzz_HOST_SRCS) $(
 fuzz-long: ## 10^8 damaged lines into the terminal on this machine; SAC_FUZZ_SEED=n makes others, SAC_FUZZ_LINES=n fewer
 	@$(MAKE) -s --no-print-directory $(BUILD)/fuzz
 	@SAC_FUZZ_LINES=$${SAC_FUZZ_LINES:-100000000} $(BUILD)/fuzz
+
+.PHONY: fuzz-image-long
+fuzz-image-long: ## 10^5 damaged lines at the image on the board; SAC_FUZZ_SEED=n makes others, SAC_FUZZ_LINES=n fewer
+	@$(MAKE) -s --no-print-directory $(BUILD)/image/test_image_fuzz $(BUILD)/sac.hex
+	@SAC_FUZZ_LINES=$${SAC_FUZZ_LINES:-100000} $(BUILD)/image/test_image_fuzz
 
 .PHONY: test-scripts
 test-scripts: ## the simulator program as its user sees it, and the scripts that check the build

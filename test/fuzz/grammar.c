@@ -142,9 +142,12 @@ static void put_parameters(fuzz_t *fuzz, fuzz_line_t *line)
 {
     if (fuzz->brisk && fuzz_chance(fuzz, 80)) {
         put_text(line, "vc");
-        put_u32(line, 20 + fuzz_below(fuzz, 200));
+        put_u32(line, 15 + fuzz_below(fuzz, 200));
         if (fuzz_chance(fuzz, 70)) {
             put_text(line, "a999d999");
+        }
+        if (fuzz_chance(fuzz, 60)) {
+            return;
         }
     }
     for (uint32_t parameters = fuzz_below(fuzz, 7); parameters > 0; parameters--) {
@@ -306,7 +309,7 @@ static void damage(fuzz_t *fuzz, fuzz_line_t *line)
 void fuzz_line(fuzz_t *fuzz, fuzz_line_t *line)
 {
     put_command(fuzz, line);
-    if (fuzz_chance(fuzz, 55)) {
+    if (fuzz_chance(fuzz, fuzz->brisk ? 35 : 55)) {
         uint32_t times = 1;
         while (times < 6 && fuzz_chance(fuzz, 40)) {
             times++;

@@ -22,7 +22,7 @@ enum { FUZZ_KEPT = 4 };
 typedef struct {
     uint64_t state;
     uint32_t motions;            /* so many in a hundred lines are motion commands */
-    bool brisk;                  /* most of these are short and fast: for the simulated board */
+    bool brisk;                  /* for the simulated board: most of these are short and fast, and whole */
     fuzz_line_t kept[FUZZ_KEPT]; /* lines that others are spliced with */
 } fuzz_t;
 
