@@ -39,6 +39,7 @@ bool fuzz_chance(fuzz_t *fuzz, uint32_t percent)
 
 /* %n number  %r ramp value  %m count of a motion  %P motion parameters  %e position of the queue  %a network address
  * %l letter of the configuration  %w words  %d one digit; each letter of a template may change its case. */
+/* clang-format off */
 static const char *const templates[] = {
     /* built */
     "v%n", "v%n", "vc%n", "vc%n", "v", "vc", "vd", "a%r", "a%r", "d%r", "d%r", "a", "d", "S", "S", "s", "s", "N", "n",
@@ -46,12 +47,13 @@ static const char *const templates[] = {
     /* the queue and its program mode */
     "qp", "qc", "qc%e", "qr", "qs", "q%em%m%P", "q%e%P", "q%e", "%em%m%P", "%e%P",
     /* loops, one-shots, cross references */
-    "l", "l%e", "la", "lf", "lf%e", "ls", "ls%e", "ln%n", "l%n", "x", "x%e", "x%n", "xm%m%P", "xl", "xd", "xp", "x%e %e",
+    "l", "l%e", "la", "lf", "lf%e", "ls", "ls%e", "ln%n", "l%n", "x", "x%e", "x%n", "xm%m%P", "xl", "xd", "xp",
+    "x%e %e",
     /* sync, undo */
     "y", "z",
     /* configuration and system */
-    "cc", "c", "$C", "$C%l%n", "$C%l%n", "$C%l%r", "$CC%d", "$Cc%n", "$CA%e", "$Ca%n", "$CU%n", "$E", "$H%d", "$H", "$K%d",
-    "$K", "$n", "$O%d", "$O", "$R", "$", "$%l", "%l%n", "%l%n",
+    "cc", "c", "$C", "$C%l%n", "$C%l%n", "$C%l%r", "$CC%d", "$Cc%n", "$CA%e", "$Ca%n", "$CU%n", "$E", "$H%d", "$H",
+    "$K%d", "$K", "$n", "$O%d", "$O", "$R", "$", "$%l", "%l%n", "%l%n",
     /* the network */
     "%am%m%P", "%a %w", "%a.%w", "%aS", "%a", "/%w", "/m%m", "\\%w", "0m%m%P", "%a$R", "/",
     /* nothing of these */
@@ -60,12 +62,14 @@ static const char *const templates[] = {
 enum { TEMPLATES = sizeof templates / sizeof templates[0] };
 
 static const char *const edges[] = {
-    "0",    "1",    "2",     "3",     "9",     "10",    "29",    "30",         "31",         "99",         "100",
-    "127",  "128",  "255",   "256",   "257",   "998",   "999",   "1000",       "9999",       "10000",      "10899",
-    "10900", "32767", "32768", "65535", "65536", "16777215", "16777216", "99999999", "2147483647", "2147483648", "4294967295",
-    "4294967296", "4294967297", "4294967305", "42949672950", "429496729600", "8589934593", "18446744073709551616",
+    "0", "1", "2", "3", "9", "10", "29", "30", "31", "99", "100",
+    "127", "128", "255", "256", "257", "998", "999", "1000", "9999", "10000", "10899",
+    "10900", "32767", "32768", "65535", "65536", "16777215", "16777216", "99999999", "2147483647", "2147483648",
+    "4294967295", "4294967296", "4294967297", "4294967305", "42949672950", "429496729600", "8589934593",
+    "18446744073709551616",
     "18446744073709551617", "99999999999999999999", "00000000000000000001", "000", "007",
 };
+/* clang-format on */
 enum { EDGES = sizeof edges / sizeof edges[0] };
 
 static void put(fuzz_line_t *line, uint8_t byte)
@@ -178,7 +182,8 @@ static void put_parameters(fuzz_t *fuzz, fuzz_line_t *line)
 
 static void put_words(fuzz_t *fuzz, fuzz_line_t *line)
 {
-    static const char *const words[] = {"hello", "is anyone there?", "stop", "m200", "R", "Steps 3000", "x", " ", "SAC>", "?1"};
+    static const char *const words[] = {
+        "hello", "is anyone there?", "stop", "m200", "R", "Steps 3000", "x", " ", "SAC>", "?1"};
     put_text(line, words[fuzz_below(fuzz, sizeof words / sizeof words[0])]);
 }
 
@@ -252,7 +257,7 @@ static uint8_t any_byte(fuzz_t *fuzz)
 
 static void damage(fuzz_t *fuzz, fuzz_line_t *line)
 {
-    const unsigned at = fuzz_below(fuzz, line->length + 1);  /* a place to insert at */
+    const unsigned at = fuzz_below(fuzz, line->length + 1);        /* a place to insert at */
     const unsigned some = fuzz_below(fuzz, line->length - at + 1); /* bytes behind it */
     switch (fuzz_below(fuzz, 12)) {
     case 0: /* a bit flips */

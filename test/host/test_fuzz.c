@@ -30,7 +30,7 @@
 #include "settings.h"
 #include "unity.h"
 
-enum { BLOCK_LINES = 1000, DEFAULT_LINES = 500000, FLOOD_LINES = 12, MOST_ROUNDS = 100000, HANG_SECONDS = 120 };
+enum { BLOCK_LINES = 1000, DEFAULT_LINES = 300000, FLOOD_LINES = 12, MOST_ROUNDS = 100000, HANG_SECONDS = 120 };
 
 /* -- where we are, for whoever reads the failure ---------------------------------------------------------------------- */
 
@@ -45,8 +45,8 @@ static struct {
 static void tell(const char *what, const char *more)
 {
     const unsigned shown = here.taken > FUZZ_LINE_BYTES ? here.taken - FUZZ_LINE_BYTES : 0;
-    printf("FUZZ: %s%s\n  line %u of the block, at byte %u of %u: \"%s\"", what, more, here.line, here.taken, here.length,
-           fuzz_printable(here.bytes + shown, here.taken - shown));
+    printf("FUZZ: %s%s\n  line %u of the block, at byte %u of %u: \"%s\"", what, more, here.line, here.taken,
+           here.length, fuzz_printable(here.bytes + shown, here.taken - shown));
     printf(" | \"%s\"\n", fuzz_printable(here.bytes + here.taken, here.length - here.taken));
     printf("  the last answer: \"%.2000s\"\n", terminal_port_fake_text());
     printf("  again: SAC_FUZZ_SEED=%" PRIu64 " SAC_FUZZ_LINES=%u\n", here.seed, here.line);
@@ -104,16 +104,16 @@ static bool is_possible(uint32_t velocity, uint8_t flags)
 static void check_ranges(void)
 {
     require(settings.cycle_us >= 1 && settings.hw_baud >= 300 && settings.hw_baud <= 2000000 &&
-                settings.steps_per_rev >= 1 && settings.ramp <= 1 && settings.cw_level <= 1 && settings.direction <= 1 &&
-                settings.ustep <= 7 && settings.pulse_us >= 1 && settings.slow_rpm >= 1 && settings.full_step <= 1 &&
-                is_ramp(settings.accel[0]) && is_ramp(settings.accel[1]) && is_ramp(settings.decel[0]) &&
-                is_ramp(settings.decel[1]),
+                settings.steps_per_rev >= 1 && settings.ramp <= 1 && settings.cw_level <= 1 &&
+                settings.direction <= 1 && settings.ustep <= 7 && settings.pulse_us >= 1 && settings.slow_rpm >= 1 &&
+                settings.full_step <= 1 && is_ramp(settings.accel[0]) && is_ramp(settings.accel[1]) &&
+                is_ramp(settings.decel[0]) && is_ramp(settings.decel[1]),
             "a setting is out of its range");
     require((session.flags & ~SESSION_FLAGS) == 0 && is_ramp(session.accel) && is_ramp(session.decel) &&
                 is_possible(session.velocity, session.flags),
             "a session value is out of its range");
-    require(queue_next_position() >= QUEUE_FIRST && queue_next_position() <= QUEUE_LAST && queue_pending() <= QUEUE_LAST &&
-                queue_executing_position() <= QUEUE_LAST,
+    require(queue_next_position() >= QUEUE_FIRST && queue_next_position() <= QUEUE_LAST &&
+                queue_pending() <= QUEUE_LAST && queue_executing_position() <= QUEUE_LAST,
             "a position of the queue is out of its range");
     const uint8_t flags = MOTION_CCW | MOTION_PULSES | MOTION_LINEAR | MOTION_SYNC | MOTION_CYCLE;
     for (uint8_t i = 0; i < QUEUE_POSITIONS; i++) {
@@ -203,11 +203,11 @@ static unsigned may_change(const char *text)
 }
 
 /* A member of look_t; its name says what is wrong. */
-#define REQUIRE_SAME(member)                                                                                           \
-    do {                                                                                                               \
-        if (memcmp(&before.member, &after.member, sizeof before.member) != 0) {                                        \
-            fail(what, #member);                                                                                       \
-        }                                                                                                              \
+#define REQUIRE_SAME(member)                                                    \
+    do {                                                                        \
+        if (memcmp(&before.member, &after.member, sizeof before.member) != 0) { \
+            fail(what, #member);                                                \
+        }                                                                       \
     } while (0)
 
 static void check_changes(unsigned allowed, const char *what)
@@ -468,7 +468,8 @@ static void check_line(void)
     const char *text = editor.text;
     const bool dollar = text[0] == '$' && !editor.damaged && !editor.too_long;
     if (editor.damaged || editor.too_long) {
-        require(error == (editor.damaged ? STATUS_LINE_DAMAGED : STATUS_LINE_TOO_LONG), "a broken line was not refused as such");
+        require(error == (editor.damaged ? STATUS_LINE_DAMAGED : STATUS_LINE_TOO_LONG),
+                "a broken line was not refused as such");
     }
     if (count > 0) {
         check_changes(dollar ? PENDING | STOPS : 0, "a refused line has changed ");
@@ -509,7 +510,8 @@ static void check_line(void)
                     entry->flags == typed->flags,
                 "the entry is not what was typed");
         require(after.next == before.next % QUEUE_LAST + 1, "the next position is not the next one");
-        require(after.submitted - before.submitted + after.pending == before.pending + 1u, "a command was lost or doubled");
+        require(after.submitted - before.submitted + after.pending == before.pending + 1u,
+                "a command was lost or doubled");
         for (uint8_t i = 0; i < QUEUE_POSITIONS; i++) {
             require(i == before.next || memcmp(&before.entries[i], &after.entries[i], sizeof after.entries[i]) == 0,
                     "another entry has changed");
@@ -530,7 +532,8 @@ static edit_t next_byte(void)
 
 static void check_pulses(void)
 {
-    require(engine_fake.pulses_cw == pulses_cw && engine_fake.pulses_ccw == pulses_ccw, "pulses that nobody typed, or too few");
+    require(engine_fake.pulses_cw == pulses_cw && engine_fake.pulses_ccw == pulses_ccw,
+            "pulses that nobody typed, or too few");
     before.pulses_cw = pulses_cw;
     before.pulses_ccw = pulses_ccw;
 }
@@ -639,8 +642,8 @@ static void flood(void)
     if (known && before.pending + motions <= QUEUE_LAST) {
         require(after.submitted - before.submitted + after.pending == before.pending + motions,
                 "of a flood a command was lost or doubled");
-        require(session.velocity == expected.velocity && session.accel == expected.accel && session.decel == expected.decel &&
-                    session.flags == expected.flags,
+        require(session.velocity == expected.velocity && session.accel == expected.accel &&
+                    session.decel == expected.decel && session.flags == expected.flags,
                 "a flood has not left the session that was typed");
     }
     let_time_pass();
@@ -662,8 +665,13 @@ static void one_turn(void)
     fuzz_line_t line;
     const uint32_t way = fuzz_below(&fuzz, 100);
     here.length = here.taken = 0;
+    const bool displays = way == 0; /* more of them than can wait */
     for (uint32_t lines = way < 4 ? 2 + fuzz_below(&fuzz, FLOOD_LINES - 2) : 1; lines > 0; lines--) {
         fuzz_line(&fuzz, &line);
+        if (displays && fuzz_chance(&fuzz, 80)) {
+            line.bytes[0] = (uint8_t) "qp?"[fuzz_below(&fuzz, 3)];
+            line.length = 1;
+        }
         line.length = line.length < FUZZ_LINE_BYTES - 2 ? line.length : FUZZ_LINE_BYTES - 2;
         append(&line);
         here.line++;
@@ -709,8 +717,8 @@ static void test_no_line_whatever_its_bytes_changes_more_than_it_may(void)
         const double now = seconds();
         if (now - told > 10 || made >= lines) {
             told = now;
-            printf("%" PRIu64 " lines, %" PRIu64 " ended, %" PRIu64 " taken without an error; seeds %" PRIu64 "..%" PRIu64
-                   "; %.1f s, %.0f lines/s\n",
+            printf("%" PRIu64 " lines, %" PRIu64 " ended, %" PRIu64 " taken without an error; seeds %" PRIu64
+                   "..%" PRIu64 "; %.1f s, %.0f lines/s\n",
                    made, lines_done, lines_taken, first, here.seed, now - start, (double)made / (now - start));
             fflush(stdout);
         }

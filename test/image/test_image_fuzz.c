@@ -23,7 +23,7 @@
 
 enum { BLOCK_LINES = 100, DEFAULT_LINES = 2000, MOST_LINES = 3 };
 
-#define PATIENCE (150 * MS) /* so long a motion may take before it is stopped */
+#define PATIENCE (150 * MS)  /* so long a motion may take before it is stopped */
 #define ANSWER (10 * SECOND) /* the longest answer: five displays at 38,400 Bd */
 
 static fuzz_t fuzz;
@@ -41,6 +41,9 @@ void setUp(void)
 
 void tearDown(void)
 {
+    if (Unity.CurrentTestFailed) /* also where image.c found it */
+        printf("\nline %u of the block: \"%s\"; again: SAC_FUZZ_SEED=%" PRIu64 " SAC_FUZZ_LINES=%u\n", line_number,
+               fuzz_printable(bytes, length), seed, line_number);
     image_off();
 }
 
@@ -52,8 +55,7 @@ static void fail(const char *format, ...)
     va_start(arguments, format);
     vsnprintf(what, sizeof what, format, arguments);
     va_end(arguments);
-    image_fail("line %u of the block, \"%.200s\": %s (SAC_FUZZ_SEED=%" PRIu64 " SAC_FUZZ_LINES=%u)", line_number,
-               fuzz_printable(bytes, length), what, seed, line_number);
+    image_fail("%s (SAC_FUZZ_SEED=%" PRIu64 " SAC_FUZZ_LINES=%u)", what, seed, line_number);
 }
 
 /* -- what stands in RAM ------------------------------------------------------------------------------------------------ */
@@ -133,11 +135,12 @@ static void check_range(bool holds, const char *what)
 static void check_ranges(const look_t *all)
 {
     check_range(SETTING(cycle_us) >= 1 && SETTING(hw_baud) >= 300 && SETTING(hw_baud) <= 2000000 &&
-                    SETTING(steps_per_rev) >= 1 && SETTING(ramp) <= 1 && SETTING(cw_level) <= 1 && SETTING(direction) <= 1 &&
-                    SETTING(ustep) <= 7 && SETTING(pulse_us) >= 1 && SETTING(slow_rpm) >= 1 && SETTING(full_step) <= 1,
+                    SETTING(steps_per_rev) >= 1 && SETTING(ramp) <= 1 && SETTING(cw_level) <= 1 &&
+                    SETTING(direction) <= 1 && SETTING(ustep) <= 7 && SETTING(pulse_us) >= 1 &&
+                    SETTING(slow_rpm) >= 1 && SETTING(full_step) <= 1,
                 "a setting");
-    check_range((all->session.flags & ~SESSION_FLAGS) == 0 && is_ramp(all->session.accel) && is_ramp(all->session.decel) &&
-                    is_possible(all->session.velocity, all->session.flags),
+    check_range((all->session.flags & ~SESSION_FLAGS) == 0 && is_ramp(all->session.accel) &&
+                    is_ramp(all->session.decel) && is_possible(all->session.velocity, all->session.flags),
                 "the session");
     check_range(all->next >= QUEUE_FIRST && all->next <= QUEUE_LAST && all->pending <= QUEUE_LAST, "a position");
     for (unsigned i = 0; i < QUEUE_POSITIONS; i++) {
@@ -167,14 +170,15 @@ static const char *answer(void)
     while (quiet < 6) {
         image_run(MS / 2);
         (void)board_uart_received(board, &said);
-        quiet = !board_uart_sending(board) && said == said_before && ends_with_prompt(board_uart_text(board)) ? quiet + 1 : 0;
+        quiet = !board_uart_sending(board) && said == said_before && ends_with_prompt(board_uart_text(board))
+                    ? quiet + 1
+                    : 0;
         said_before = said;
         if (board_cycle(board) <= end)
             continue;
         if (strstr(board_uart_text(board), version))
             fail("the board was reset, and no prompt");
-        fail("no prompt; the last that was said: \"%.100s\"",
-                 board_uart_text(board) + (said > 100 ? said - 100 : 0));
+        fail("no prompt; the last that was said: \"%.100s\"", board_uart_text(board) + (said > 100 ? said - 100 : 0));
     }
     const char *text = image_take_text();
     if (strstr(text, version))
@@ -282,7 +286,8 @@ static void one_turn(void)
         reading_t reading;
         const bool broken = editor.damaged || editor.too_long;
         read_t kind = broken ? READ_REFUSED : reference_read(editor.text, &before.session, &reading);
-        if ((kind == READ_MOTION || kind == READ_VALUE) && !is_possible(reading.command.velocity, reading.command.flags))
+        if ((kind == READ_MOTION || kind == READ_VALUE) &&
+            !is_possible(reading.command.velocity, reading.command.flags))
             kind = READ_REFUSED;
         if (errors > 1)
             fail("%u errors for one line", errors);
@@ -367,7 +372,8 @@ static void test_no_damaged_line_loses_the_prompt_resets_or_makes_a_pulse_of_its
         made += line_number;
         if (time(NULL) - told > 10 || made >= lines) {
             told = time(NULL);
-            printf("%" PRIu64 " lines, %u motions (%u of them stopped), %u refused; seeds %" PRIu64 "..%" PRIu64 "; %ld s\n",
+            printf("%" PRIu64 " lines, %u motions (%u of them stopped), %u refused; seeds %" PRIu64 "..%" PRIu64
+                   "; %ld s\n",
                    made, motions_seen, motions_stopped, refused_lines, first, seed, (long)(told - start));
             fflush(stdout);
         }
