@@ -30,7 +30,7 @@
 #include "settings.h"
 #include "unity.h"
 
-enum { BLOCK_LINES = 1000, DEFAULT_LINES = 300000, FLOOD_LINES = 12, MOST_ROUNDS = 100000, HANG_SECONDS = 120 };
+enum { BLOCK_LINES = 1000, DEFAULT_LINES = 200000, FLOOD_LINES = 12, MOST_ROUNDS = 100000, HANG_SECONDS = 120 };
 
 /* -- where we are, for whoever reads the failure ---------------------------------------------------------------------- */
 
