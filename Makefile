@@ -75,7 +75,7 @@ FIRMWARE_SRCS := \
 # needed on the host alone, and assembler on the AVR alone.
 
 HOST_TESTS := test_number test_status test_baud test_line test_settings test_store test_session test_queue \
-    test_encoder test_ops test_motion_syntax test_commands test_configure test_display test_terminal test_boot test_drivers \
+    test_encoder test_ops test_motion_syntax test_commands test_configure test_display test_terminal test_fuzz test_boot test_drivers \
     test_wide test_block test_ramp test_profile test_engine test_property_planner test_processor_model
 FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 STORE_SRCS := firmware/eeprom/store.c firmware/base/crc16.c firmware/settings.c test/host/fakes/eeprom_port_fake.c
@@ -98,6 +98,8 @@ test_commands_SRCS := $(CLI_SRCS)
 test_configure_SRCS := $(CLI_SRCS)
 test_display_SRCS := $(CLI_SRCS)
 test_terminal_SRCS := $(CLI_SRCS) firmware/cli/terminal.c firmware/cli/line.c firmware/base/status.c
+test_fuzz_SRCS := $(test_terminal_SRCS)
+test_fuzz_HOST_SRCS := test/fuzz/grammar.c test/fuzz/reference.c
 test_boot_SRCS := firmware/boot.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 test_drivers_SRCS := firmware/drivers.c
 test_wide_SRCS := firmware/base/wide.S
@@ -118,10 +120,11 @@ AVR_TESTS := test_number test_line test_session test_wide test_block test_ramp t
 # Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
 IMAGE_TESTS := test_image_boot test_image_pins test_image_encoder test_image_motion test_image_queue \
     test_image_sequence test_image_terminal test_image_stop test_image_configure test_image_timing test_image_stress \
-    test_image_estop test_image_ops test_image_processor
+    test_image_estop test_image_ops test_image_processor test_image_fuzz
 test_image_processor_SRCS := test/image/processor_model.c
 # What every whole-image test is linked with.
 IMAGE_COMMON_SRCS := test/image/image.c test/image/model.c
+test_image_fuzz_SRCS := test/fuzz/grammar.c test/fuzz/reference.c firmware/settings.c
 
 # Tests written in Python.
 SCRIPT_TESTS := test/tools/test_tools.py test/sim/test_sacsim.py
@@ -340,6 +343,26 @@ test-image: ## the whole image on the simulated board
 .PHONY: test-known-failures
 test-known-failures: ## the tests that this version is known to fail, left out of `make test` (docs/design.md)
 	@SAC_KNOWN_FAILURES=1 $(MAKE) --no-print-directory test-host test-image
+
+# The same lines without the sanitizers, several times as fast.
+$(BUILD)/fuzz: test/host/test_fuzz.c $(test_fuzz_SRCS) $(test_fuzz_HOST_SRCS) $(BUILD)/unity.o $(HOST_HEADERS) Makefile
+	$(call say,CC  $@)
+	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O2 -flto $(UNITY_FLAGS) $(TEST_INCLUDES) -o $@ $(filter %.c %.o,$^) -lm
+
+.PHONY: fuzz-long
+fuzz-long: ## 10^8 damaged lines into the terminal on this machine; SAC_FUZZ_SEED=n makes others, SAC_FUZZ_LINES=n fewer
+	@$(MAKE) -s --no-print-directory $(BUILD)/fuzz
+	@SAC_FUZZ_LINES=$${SAC_FUZZ_LINES:-100000000} $(BUILD)/fuzz
+
+.PHONY: fuzz-image-long
+fuzz-image-long: ## 10^5 damaged lines at the image on the board; SAC_FUZZ_SEED=n makes others, SAC_FUZZ_LINES=n fewer
+	@$(MAKE) -s --no-print-directory $(BUILD)/image/test_image_fuzz $(BUILD)/sac.hex
+	@SAC_FUZZ_LINES=$${SAC_FUZZ_LINES:-100000} $(BUILD)/image/test_image_fuzz
+
+.PHONY: test-processor
+test-processor: ## 2,000 random scripts on the image and on the model of the command processor
+	@$(MAKE) -s --no-print-directory $(BUILD)/image/test_image_processor $(BUILD)/sac.hex
+	@SAC_SCRIPTS=$${SAC_SCRIPTS:-2000} $(BUILD)/image/test_image_processor
 
 .PHONY: test-long
 test-long: ## ten million mixed steps with the terminal busy (some minutes); `make test` makes a million

@@ -92,7 +92,10 @@ static double line_find(const line_t *line, double t, int level)
                 return t;
             t = frame->start;
         }
-        for (unsigned k = (unsigned)((t - frame->start) / frame->bit); k < frame->count; k++) {
+        unsigned k = (unsigned)((t - frame->start) / frame->bit);
+        if (frame->start + (k + 1) * frame->bit <= t)
+            k++; /* the quotient was rounded down below a whole number: t would have both levels */
+        for (; k < frame->count; k++) {
             if ((frame->bits >> k & 1) == level)
                 return fmax(t, frame->start + k * frame->bit);
         }

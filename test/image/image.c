@@ -184,17 +184,25 @@ static bool still(void)
     return (board_peek8(board, TIMSK1) & TOIE1) == 0 && board_peek8(board, state_address) == STANDBY;
 }
 
-void image_idle(uint64_t most_cycles)
+bool image_idles(uint64_t most_cycles)
 {
     uint64_t end = board_cycle(board) + most_cycles;
     unsigned looks = 0;
     while (looks < 10 * MS / LOOK) { /* for 10 ms: a command may be in planning */
         if (board_cycle(board) > end)
-            image_fail("expected the motor to stand by cycle %" PRIu64 ", it is in state %u after %zu pulses", end,
-                       board_peek8(board, state_address), train.count);
+            return false;
         image_run(LOOK);
         looks = still() ? looks + 1 : 0;
     }
+    return true;
+}
+
+void image_idle(uint64_t most_cycles)
+{
+    uint64_t end = board_cycle(board) + most_cycles;
+    if (!image_idles(most_cycles))
+        image_fail("expected the motor to stand by cycle %" PRIu64 ", it is in state %u after %zu pulses", end,
+                   board_peek8(board, state_address), train.count);
 }
 
 void image_until_state(uint8_t state, uint64_t most_cycles)

@@ -58,6 +58,7 @@ void image_refused(const char *line, const char *answer); /* the same; the answe
 const char *image_take_text(void); /* all that was printed since the last line was asked; it is forgotten then */
 void image_run(uint64_t cycles);
 void image_idle(uint64_t most_cycles); /* until the motor stands, nothing is pending and the gap is over */
+bool image_idles(uint64_t most_cycles);      /* whether it does so in that time */
 void image_until_state(uint8_t state, uint64_t most_cycles);
 void image_until_pulses(size_t count, uint64_t most_cycles);
 int32_t image_position(void); /* as `p` shows it; it must show STANDBY and no fault */
