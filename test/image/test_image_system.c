@@ -177,7 +177,7 @@ static void test_a_warm_boot_loads_what_is_configured_and_keeps_the_queue(void)
     image_do("$R");
     image_assert_holds(image_display("cf"), "v 150 cycle 2000\r\na 1.00 d 1.00 harmonic\r\nGAP on, full step, EnF\r\n"
                                             "ops 36, soft_ops off, CRC 1, ACK on\r\n");
-    image_assert_row(7, "7\t123\t CCW\t385\t777\t 3.00\t1.00\t0\t  0");
+    image_assert_row(7, "7\t123\t CCW\t386\t777\t 3.00\t1.00\t0\t  0");
     image_train_clear();
     image_do("m10vc1000a999d999");
     image_idle(LONG_WAIT);
@@ -241,6 +241,42 @@ static void test_the_queue_is_saved_and_restored(void)
     image_do("x3");
     image_idle(LONG_WAIT);
     image_assert_pulses(35);
+}
+
+/* QUE-017, PER-004: all 30 entries are saved while the motor runs at 33 kHz and lines come back to back */
+static void test_a_save_of_the_queue_delays_no_pulse_and_loses_no_character(void)
+{
+    for (unsigned n = 1; n <= 30; n++) {
+        char line[40];
+        snprintf(line, sizeof line, "q%um%uv%ua%ud7t%u", n, 1000 + n, 50 + n, n, n);
+        image_do(line);
+    }
+    image_train_clear();
+    train.keep = false;
+    image_do("mvc30a999d999");
+    image_run(50 * MS);
+    image_train_clear();
+    image_send("qs\r");
+    for (unsigned n = 0; n < 1500; n++) { /* 2 s of lines */
+        char line[16];
+        snprintf(line, sizeof line, "a%u\r", 1 + n % 900);
+        image_send(line);
+    }
+    uint64_t from = board_cycle(board);
+    image_sent();
+    TEST_ASSERT_TRUE(board_cycle(board) - from > SECOND);
+    TEST_ASSERT_EQUAL(480, train.interval_min);
+    TEST_ASSERT_UINT64_WITHIN(2, (board_cycle(board) - from) / 480, train.count); /* and none longer */
+    TEST_ASSERT_EQUAL(0, board_uart_overruns(board));
+    TEST_ASSERT_NULL(strchr(image_take_text(), '?'));
+    image_send("S\r");
+    image_run(WRITTEN);
+    image_take_text();
+    image_assert_holds(image_display("cf"), "a 600 d 1.00"); /* the last one: 1 + 1499 % 900 */
+    char saved[4000];
+    snprintf(saved, sizeof saved, "%s", image_display("q"));
+    power_cycle();
+    TEST_ASSERT_EQUAL_STRING(saved, image_display("q"));
 }
 
 /* QUE-018, QUE-021 */
@@ -526,6 +562,7 @@ int main(void)
     RUN_TEST(test_a_warm_boot_changes_the_rate_of_the_port);
     RUN_TEST(test_one_shots_and_continuous_motion_leave_the_session_alone);
     RUN_TEST(test_the_queue_is_saved_and_restored);
+    RUN_TEST(test_a_save_of_the_queue_delays_no_pulse_and_loses_no_character);
     RUN_TEST(test_without_a_snapshot_the_queue_is_restored_to_system_defaults);
     RUN_TEST(test_autorun_loops_the_saved_queue_with_nobody_at_the_terminal);
     RUN_TEST(test_autorun_needs_a_whole_snapshot);
