@@ -7,7 +7,7 @@
  *   keys ABC ESC                     these keys are pressed, without Return
  *   Estop to ground, Estop open      likewise sync and RST
  *   encoder N lines cw (or ccw)      it is turned, 4 ms a line
- *   power off and on, reset button
+ *   power off and on, reset button; and: reset button, keys ESC ESC ESC
  *   N pulses on clk                  so many since the last such line; the firmware's own count is not asked
  *   DC1 DC2                          these bytes have arrived since the last such line; in answers they are left out
  * A block that begins with the version line shows what is printed at power-on.
@@ -181,7 +181,7 @@ static void act(const char *what)
         press(what + 5);
     } else if (sscanf(what, "encoder %u lines %7s", &number, word) == 2) {
         turn(number, strcmp(word, "cw") == 0);
-    } else if (strcmp(what, "power off and on") == 0 || strcmp(what, "reset button") == 0) {
+    } else if (strcmp(what, "power off and on") == 0 || strncmp(what, "reset button", 12) == 0) {
         if (*what == 'p') {
             static uint8_t eeprom[BOARD_EEPROM_BYTES];
             bool held = board_pin_level(board, RST) == 0;
@@ -193,6 +193,11 @@ static void act(const char *what)
             encoder_at = 2;
         } else {
             board_reset(board, BOARD_RESET_EXTERNAL);
+            if (what[12] != '\0') {
+                image_run(100 * MS);
+                collect();
+                press(what + strlen("reset button, keys "));
+            }
         }
         until_prompt(what);
     } else if (sscanf(what, "%u pulses on %7s", &number, word) == 2) {
