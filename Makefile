@@ -133,6 +133,7 @@ SCRIPT_TESTS := test/tools/test_tools.py test/sim/test_sacsim.py
 CHECKS := \
     --check includes='$(PYTHON) tools/check_includes.py' \
     --check pins='$(PYTHON) tools/check_pins.py' \
+    --check manual='$(PYTHON) tools/manual.py' \
     --check budgets='$(MAKE) -s --no-print-directory budgets'
 
 # The board, its models, the simulator program and the benchmark list their own sources.
@@ -407,6 +408,10 @@ flash-isp: $(BUILD)/sac.hex ## flash and set the fuses with an ISP programmer: P
 
 # -- housekeeping ----------------------------------------------------------------------------------------------------
 
+.PHONY: manual
+manual: ## bring the manual's tables up to date with the firmware's
+	@$(PYTHON) tools/manual.py --write
+
 C_FILES = $(shell git ls-files '*.c' '*.h')
 
 .PHONY: format
@@ -414,7 +419,7 @@ format: ## clang-format on all C files that git knows
 	clang-format -i $(C_FILES)
 
 .PHONY: lint
-lint: ## the checks alone: includes, pin table, budgets; shell scripts where shellcheck is installed
+lint: ## the checks alone: includes, pin table, manual, budgets; shell scripts where shellcheck is installed
 	@$(call build_then_run,$(BUILD)/sac.elf,lint) $(CHECKS)
 	@if command -v shellcheck >/dev/null; then shellcheck sac tools/setup.sh .ci/run; fi
 

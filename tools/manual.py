@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks the manual against the firmware: its tables, and that its links lead somewhere.
+"""Checks the manual against the firmware: its tables, the pins in its pictures; and that its links lead somewhere.
 
 A table stands between the lines <!-- table: NAME --> and <!-- /table -->. Its first columns are made from the
 firmware's tables (commands.def, motion_parameters.def, settings.def, status.def, board.h); the columns behind them are
@@ -88,7 +88,7 @@ def configuration(read):
 
 def errors(read):
     for number, words, advice in rows_of(STATUS, read("base/status.def"), "errors"):
-        yield code(f"?{number} {words}"), cell(advice)
+        yield code(f"?{number}"), cell(words), cell(advice)
 
 
 def pins(read):
@@ -101,7 +101,7 @@ TABLES = {
     "commands": (commands, ("You type", "Case", "What it does"), ("Described in",)),
     "parameters": (parameters, ("Letter", "Number"), ("Without a number", "Meaning")),
     "configuration": (configuration, ("Letter", "Name", "Range", "Factory"), ("Unit", "Meaning")),
-    "errors": (errors, ("Answer", "What to do"), ("More",)),
+    "errors": (errors, ("Answer", "Words", "What to do"), ("More",)),
     "pins": (pins, ("Post", "Nano", "AVR", "I/O"), ("Wire it to",)),
 }
 
@@ -142,6 +142,17 @@ def check_links(path, text):
     return wrong
 
 
+def check_pictures(folder, board_h):
+    """Returns what is wrong with the pins in the pictures: texts like `D10 clk`."""
+    posts = {nano: NAMES.get(name, name) for name, _, _, nano, _, _ in rows_of(POST, board_h, "pins")}
+    wrong = []
+    for path in sorted(folder.glob("*.svg")):
+        for nano, name in re.findall(r">([AD]\d+) ([^<]+)</text>", path.read_text(encoding="utf-8")):
+            if posts.get(nano) != name:
+                wrong.append(f"{path}: {nano} is not {name} but {posts.get(nano)}")
+    return wrong
+
+
 def main():
     """Checks or writes, and returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -179,6 +190,7 @@ def main():
         elif wanted != text:
             wrong.append(f"{path}: a table differs from the firmware's: make manual")
         wrong += check_links(path, wanted)
+    wrong += check_pictures(arguments.manual / "pictures", read("board.h"))
     wrong += [f"the manual has no table {name}" for name in TABLES if name not in seen]
     for line in wrong:
         print(f"error: {line}", file=sys.stderr)
