@@ -48,11 +48,11 @@ def rows_of(pattern, text, what):
 
 def cell(text):
     """Returns text as it may stand in a table."""
-    return text.replace("|", "\\|")
+    return text.replace("|", "\\|").replace("<", "&lt;")
 
 
 def code(text):
-    return f"`{cell(text)}`"
+    return "`" + text.replace("|", "\\|") + "`"
 
 
 def commands(read):
