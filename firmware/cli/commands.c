@@ -103,7 +103,7 @@ static status_t command_read_ahead(const char *rest)
     }
     if (status == STATUS_OK) {
         motion_syntax_keep(&ahead, &session);
-        if (ahead.single) {
+        if (ahead.single == MOTION_SYNTAX_VELOCITY) {
             queue_follow(&ahead.command);
         }
     }

@@ -12,6 +12,8 @@ typedef enum {
     PARAMETERS
 } parameter_t;
 
+_Static_assert(PARAMETER_VELOCITY == MOTION_SYNTAX_VELOCITY, "others know it by this number");
+
 /* motion_syntax_t.number: what the number being read consists of, and what it may */
 enum {
     HAS_DIGIT = 1 << 0,

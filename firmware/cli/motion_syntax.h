@@ -35,6 +35,8 @@ typedef struct {
     uint8_t single;           /* not 0: v, a or d alone, no second parameter may follow */
 } motion_syntax_t;
 
+#define MOTION_SYNTAX_VELOCITY 1 /* single: v or vc */
+
 /* The range of what is either 0 or 1, in flash. */
 extern const char motion_syntax_range_flag[];
 

@@ -125,6 +125,8 @@ void engine_init(void)
     profile_basis(&basis, settings.steps_per_rev, drivers_ustep(settings.driver_id, settings.ustep),
                   settings.slow_rpm);
     engine.v_in_play = basis.v_slow;
+    engine.in_play_cycle_us = 0;
+    engine.gap_off = false;
     certain_centi = (130000000u >> basis.factor_log2) / basis.steps_per_rev;
     engine.width_ticks = (uint16_t)settings.pulse_us * TICKS_PER_US;
     step_port_init();

@@ -496,6 +496,14 @@ static void test_a_velocity_typed_in_continuous_motion_is_followed(void)
             image_fail("pulse %zu: from %.1f to %.1f RPM in one step", k, before, after);
     }
     image_do("S");
+    /* a and d are for what comes next. */
+    image_do("mvc900a999d999");
+    image_run(200 * MS);
+    image_do("a5");
+    image_do("d5");
+    image_run(200 * MS);
+    image_assert_interval(train.count - 2, 14400, 1);
+    image_do("S");
 }
 
 /* -- SYN, QUE -------------------------------------------------------------------------------------------------------- */
