@@ -106,9 +106,9 @@ static bool matches(const char *expected, const char *seen)
 
 /* -- what is done --------------------------------------------------------------------------------------------------- */
 
-static void power_on(const uint8_t *eeprom)
+static void power_on(void)
 {
-    image_power_on_with(eeprom);
+    image_power_on();
     encoder_at = 2; /* open: both high */
     printed[0] = signals[0] = '\0';
 }
@@ -247,7 +247,7 @@ static size_t compare(size_t at, const char *action)
 static void test_example(void)
 {
     size_t at = block_at;
-    power_on(NULL);
+    power_on();
     until_prompt("power on");
     image_train_clear();
     if (!is_action(lines[at]))
