@@ -120,7 +120,7 @@ AVR_TESTS := test_number test_line test_session test_wide test_block test_ramp t
 # Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
 IMAGE_TESTS := test_image_boot test_image_pins test_image_encoder test_image_motion test_image_queue \
     test_image_sequence test_image_terminal test_image_stop test_image_configure test_image_system test_image_timing test_image_stress \
-    test_image_estop test_image_ops test_image_processor test_image_fuzz
+    test_image_estop test_image_ops test_image_processor test_image_fuzz test_image_manual
 test_image_processor_SRCS := test/image/processor_model.c
 # What every whole-image test is linked with.
 IMAGE_COMMON_SRCS := test/image/image.c test/image/model.c
@@ -133,6 +133,7 @@ SCRIPT_TESTS := test/tools/test_tools.py test/sim/test_sacsim.py
 CHECKS := \
     --check includes='$(PYTHON) tools/check_includes.py' \
     --check pins='$(PYTHON) tools/check_pins.py' \
+    --check manual='$(PYTHON) tools/manual.py' \
     --check budgets='$(MAKE) -s --no-print-directory budgets'
 
 # The board, its models, the simulator program and the benchmark list their own sources.
@@ -407,6 +408,10 @@ flash-isp: $(BUILD)/sac.hex ## flash and set the fuses with an ISP programmer: P
 
 # -- housekeeping ----------------------------------------------------------------------------------------------------
 
+.PHONY: manual
+manual: ## bring the manual's tables up to date with the firmware's
+	@$(PYTHON) tools/manual.py --write
+
 C_FILES = $(shell git ls-files '*.c' '*.h')
 
 .PHONY: format
@@ -414,7 +419,7 @@ format: ## clang-format on all C files that git knows
 	clang-format -i $(C_FILES)
 
 .PHONY: lint
-lint: ## the checks alone: includes, pin table, budgets; shell scripts where shellcheck is installed
+lint: ## the checks alone: includes, pin table, manual, budgets; shell scripts where shellcheck is installed
 	@$(call build_then_run,$(BUILD)/sac.elf,lint) $(CHECKS)
 	@if command -v shellcheck >/dev/null; then shellcheck sac tools/setup.sh .ci/run; fi
 

@@ -86,6 +86,69 @@ class Pins(ToolTest):
         self.assertEqual(1, self.tool("check_pins.py", *arguments)[0])
 
 
+class Manual(ToolTest):
+    """tools/manual.py"""
+
+    ERRORS = 'STATUS(SYNTAX, 2, "syntax", "look at the letters")\n'
+    HEAD = "| Answer | Words | What to do | More |\n| --- | --- | --- | --- |\n"
+
+    def setUp(self):
+        super().setUp()
+        self.write("firmware/base/status.def", self.ERRORS)
+        self.write("firmware/cli/commands.def", 'COMMAND(QUEUE, \'q\', 0, ANY, NONE, DISPLAY, HELP("q", "the queue"))\n')
+        self.write("firmware/cli/motion_parameters.def", "PARAMETER(CYCLE, 'c', WHOLE)\n")
+        self.write("firmware/settings.def", """#define SETTINGS_ACCEL 150
+SETTING('d', PAIR_0, accel, RAMP, SETTINGS_ACCEL, "acc") /* words */
+SETTING_KIND(RAMP, "0.01..999")
+""")
+        self.write("firmware/board.h", 'POST(CLK, B, 2, "D10", OUT, "OC1B")\n')
+        self.chapter("| `?2` | synta | old words | by hand |\n")
+
+    def chapter(self, errors, more=""):
+        """Writes a manual of one chapter."""
+        tables = {
+            "errors": errors, "commands": "| `q` | | | here |\n", "parameters": "| `vc` | | a | b |\n",
+            "configuration": "| `d` | | | | unit | meaning |\n", "pins": "| **clk** | | | | STEP |\n",
+        }
+        text = "".join(f"<!-- table: {name} -->\n{rows}<!-- /table -->\n" for name, rows in tables.items())
+        return self.write("docs/manual/one.md", "# One\n" + text + more)
+
+    def manual(self, *arguments):
+        """Returns the exit code and the chapter."""
+        code = self.tool("manual.py", *arguments)[0]
+        return code, (self.folder / "docs/manual/one.md").read_text(encoding="utf-8")
+
+    def test_tables_follow_the_firmware_and_keep_what_is_written_by_hand(self):
+        self.assertEqual(1, self.manual()[0])
+        code, text = self.manual("--write")
+        self.assertEqual(0, code)
+        self.assertIn(self.HEAD + "| `?2` | syntax | look at the letters | by hand |\n", text)
+        self.assertIn("| `q` | either | the queue | here |\n", text)
+        self.assertIn("| `vc` | whole number | a | b |\n", text)
+        self.assertIn("| `d` | acc | 0.01..999 | 1.50 | unit | meaning |\n", text)
+        self.assertIn("| **clk** | D10 | PB2 | out | STEP |\n", text)
+        self.assertEqual(0, self.manual()[0])
+
+    def test_a_new_row_has_to_be_described(self):
+        self.write("firmware/base/status.def", self.ERRORS + 'STATUS(RANGE, 3, "range", "look at the range")\n')
+        code, text = self.manual("--write")
+        self.assertEqual(1, code)
+        self.assertIn("| `?3` | range | look at the range |  |\n", text)
+
+    def test_links_have_to_lead_somewhere(self):
+        self.manual("--write")
+        text = self.manual()[1]
+        for link, code in (("#one", 0), ("one.md#one", 0), ("#two", 1), ("two.md", 1), ("https://example.org", 0)):
+            self.write("docs/manual/one.md", f"{text}\n[words]({link})\n")
+            self.assertEqual(code, self.manual()[0], link)
+
+    def test_pins_in_pictures_are_those_of_the_board(self):
+        self.manual("--write")
+        for words, code in (("D10 clk", 0), ("D9 clk", 1), ("D10 dir", 1), ("5V", 0)):
+            self.write("docs/manual/pictures/one.svg", f"<text>{words}</text>")
+            self.assertEqual(code, self.manual()[0], words)
+
+
 class Image(ToolTest):
     """tools/check_size.py and tools/check_stack.py"""
 
