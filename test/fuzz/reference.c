@@ -201,7 +201,7 @@ read_t reference_read(const char *text, const session_t *before, reading_t *read
 
 /* -- edits ------------------------------------------------------------------------------------------------------------ */
 
-bool reference_edit(const char *text, const motion_command_t *entry, motion_command_t *edited)
+read_t reference_edit(const char *text, const motion_command_t *entry, motion_command_t *edited)
 {
     char upto_space[LINE_CHARACTERS + 1];
     const size_t length = strcspn(text, " ");
@@ -209,15 +209,16 @@ bool reference_edit(const char *text, const motion_command_t *entry, motion_comm
     upto_space[length] = '\0';
     *edited = *entry;
     word_t word, accel = {0}, decel = {0};
-    bool counted = false, unit = false;
+    bool counted = false, unit = false, nothing = false;
     for (const char *at = upto_space; *at != '\0';) {
         at = read_word(at, &word);
         accel_code_t code;
-        if (at == NULL || !apply(&word, edited) || (word.letter == 'm' && (word.digits == 0 || !word.not_zero)) ||
+        if (at == NULL || !apply(&word, edited) || (word.letter == 'm' && !word.not_zero && !unit) ||
             ((word.letter == 'a' || word.letter == 'd') && !read_ramp(&word, 1, &code))) {
-            return false;
+            return READ_REFUSED;
         }
         counted |= word.letter == 'm';
+        nothing |= word.letter == 'm' && !word.not_zero;
         unit |= word.letter == 'f' || word.letter == 'p';
         if (word.letter == 'a') {
             accel = word;
@@ -239,7 +240,7 @@ bool reference_edit(const char *text, const motion_command_t *entry, motion_comm
     if (counted && !unit) {
         set_flag(edited, MOTION_PULSES, false);
     }
-    return true;
+    return nothing ? READ_OPEN : READ_MOTION;
 }
 
 /* -- the configuration ------------------------------------------------------------------------------------------------ */

@@ -45,11 +45,12 @@ typedef struct {
 /* The number that *text begins with; *text is then what follows it. False: there is none, or it is out of its range. */
 bool reference_number(const char **text, double least, double most, uint32_t *number);
 
-/* What stands behind the position in an edit: *edited is the entry afterwards. The engine may still find it too fast. */
-bool reference_edit(const char *text, const motion_command_t *entry, motion_command_t *edited);
-
 /* <letter><value> of the configuration: *stored with this value. False: to be refused; *stored stays. */
 bool reference_setting(const char *text, settings_t *stored);
+
+/* What stands behind the position in an edit: READ_MOTION, and *edited is the entry afterwards; the engine may still find
+ * it too fast. READ_OPEN: to be refused for its count, which stands behind f or p. */
+read_t reference_edit(const char *text, const motion_command_t *entry, motion_command_t *edited);
 
 read_t reference_read(const char *text, const session_t *before, reading_t *reading);
 
