@@ -168,7 +168,7 @@ read_t reference_read(const char *text, const session_t *before, reading_t *read
         }
         last = word.letter;
         ramp |= last == 'l';
-        accel_code_t code;
+        accel_code_t code = 0;
         if ((last == 'a' || last == 'd') && !read_ramp(&word, 1, &code)) {
             return READ_REFUSED;
         }
@@ -179,7 +179,7 @@ read_t reference_read(const char *text, const session_t *before, reading_t *read
         }
     }
     const unsigned linear = (command->flags & MOTION_LINEAR) != 0;
-    accel_code_t code;
+    accel_code_t code = 0;
     if (ramp || accel.letter != 0) {
         (void)read_ramp(&accel, settings.accel[linear], &code);
         command->accel = code;
@@ -212,7 +212,7 @@ read_t reference_edit(const char *text, const motion_command_t *entry, motion_co
     bool counted = false, unit = false, nothing = false;
     for (const char *at = upto_space; *at != '\0';) {
         at = read_word(at, &word);
-        accel_code_t code;
+        accel_code_t code = 0;
         if (at == NULL || !apply(&word, edited) || (word.letter == 'm' && !word.not_zero && !unit) ||
             ((word.letter == 'a' || word.letter == 'd') && !read_ramp(&word, 1, &code))) {
             return READ_REFUSED;
@@ -228,12 +228,12 @@ read_t reference_edit(const char *text, const motion_command_t *entry, motion_co
     }
     const unsigned linear = (edited->flags & MOTION_LINEAR) != 0;
     if (accel.letter != 0) {
-        accel_code_t code;
+        accel_code_t code = 0;
         (void)read_ramp(&accel, settings.accel[linear], &code);
         edited->accel = code;
     }
     if (decel.letter != 0) {
-        accel_code_t code;
+        accel_code_t code = 0;
         (void)read_ramp(&decel, settings.decel[linear], &code);
         edited->decel = code;
     }
@@ -300,7 +300,7 @@ bool reference_setting(const char *text, settings_t *stored)
     const size_t length = strcspn(at, " ");
     memcpy(value, at, length);
     value[length] = '\0';
-    accel_code_t code;
+    accel_code_t code = 0;
     if (strchr("defg", letter) != NULL) {
         if (!read_code(value, &code)) {
             return false;
