@@ -2,6 +2,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "cli/terminal_port.h"
+#include "fuzz/reference.h"
 
 /* -- chance ----------------------------------------------------------------------------------------------------------- */
 
@@ -38,21 +39,21 @@ bool fuzz_chance(fuzz_t *fuzz, uint32_t percent)
 /* -- the grammar ------------------------------------------------------------------------------------------------------ */
 
 /* %n number  %r ramp value  %m count of a motion  %P motion parameters  %e position of the queue  %a network address
- * %l letter of the configuration  %w words  %d one digit; each letter of a template may change its case. */
+ * %l letter of the configuration  %w words  %d one digit  %c f or p; each letter of a template may change its case. */
 /* clang-format off */
 static const char *const templates[] = {
-    /* built */
+    /* motion, session, displays */
     "v%n", "v%n", "vc%n", "vc%n", "v", "vc", "vd", "a%r", "a%r", "d%r", "d%r", "a", "d", "S", "S", "s", "s", "N", "n",
     "g", "b", "q", "cf", "p", "?", "", "$L0", "$L1", "$L", "$L%n", "$F", "$P", "$U", "+", "-", "++-+", "+m%m", "-%n",
     /* the queue and its program mode */
-    "qp", "qc", "qc%e", "qr", "qs", "q%em%m%P", "q%e%P", "q%e", "%em%m%P", "%e%P",
+    "qp", "qc", "qc%e", "qr", "qs", "qr", "qs", "q%em%m%P", "q%em%m%P", "q%e%P", "q%e%P", "q%e%P%cm%m", "q%e", "%em%m%P", "%e%P",
     /* loops, one-shots, cross references */
-    "l", "l%e", "la", "lf", "lf%e", "ls", "ls%e", "ln%n", "l%n", "x", "x%e", "x%n", "xm%m%P", "xl", "xd", "xp",
+    "l", "l", "l%e", "la", "lf", "lf%e", "ls", "ls%e", "ln%n", "l%n", "x", "x%e", "x%e", "x%n", "xm%m%P", "xm%m%P", "xl", "xd", "xp",
     "x%e %e",
     /* sync, undo */
-    "y", "z",
+    "y", "z", "z", "z",
     /* configuration and system */
-    "cc", "c", "$C", "$C%l%n", "$C%l%n", "$C%l%r", "$CC%d", "$Cc%n", "$CA%e", "$Ca%n", "$CU%n", "$E", "$H%d", "$H",
+    "cc", "c", "$C", "$C%l%n", "$C%l%d", "$C%l%d", "$C%l%r", "$CU%d%d", "$R", "$CC%d", "$Cc%n", "$CA%e", "$Ca%n", "$CU%n", "$E", "$H%d", "$H",
     "$K%d", "$K", "$n", "$O%d", "$O", "$R", "$", "$%l", "%l%n", "%l%n",
     /* the network */
     "%am%m%P", "%a %w", "%a.%w", "%aS", "%a", "/%w", "/m%m", "\\%w", "0m%m%P", "%a$R", "/",
@@ -60,6 +61,13 @@ static const char *const templates[] = {
     "R", "%w", "k%n", "%n", " m%m%P", ".%n",
 };
 enum { TEMPLATES = sizeof templates / sizeof templates[0] };
+
+/* What the modes read, by fuzz_mode_t. */
+static const char *const in_mode[][8] = {
+    [MODE_QUEUE] = {"%em%m%P", "%e%P", "%e%P%cm%m", "%e", "q", "x", "?", "s"},
+    [MODE_ARRAY] = {"%e,%e", "%e,%e", "%e,0", "%d,%d", "%n,%n", "x", "q", "S"},
+    [MODE_CONFIGURE] = {"%l%n", "%l%n", "%l%d", "%l%r", "U%d%d", "x", "S", "%l"},
+};
 
 static const char *const edges[] = {
     "0", "1", "2", "3", "9", "10", "29", "30", "31", "99", "100",
@@ -203,6 +211,7 @@ static void put_template(fuzz_t *fuzz, fuzz_line_t *line, const char *text)
         case 'a': put_u32(line, fuzz_chance(fuzz, 30) ? 85 : fuzz_below(fuzz, 260)); break;
         case 'l': put(line, (uint8_t)((fuzz_chance(fuzz, 50) ? 'A' : 'a') + (int)fuzz_below(fuzz, 26))); break;
         case 'w': put_words(fuzz, line); break;
+        case 'c': put(line, fuzz_chance(fuzz, 50) ? 'f' : 'p'); break;
         default: put(line, (uint8_t)('0' + fuzz_below(fuzz, 10))); break;
         }
     }
@@ -216,7 +225,9 @@ static bool is_letter(uint8_t byte)
 static void put_command(fuzz_t *fuzz, fuzz_line_t *line)
 {
     line->length = 0;
-    if (fuzz_chance(fuzz, fuzz->motions)) {
+    if (fuzz->mode != MODE_COMMANDS && fuzz_chance(fuzz, 80)) {
+        put_template(fuzz, line, in_mode[fuzz->mode][fuzz_below(fuzz, 8)]);
+    } else if (fuzz_chance(fuzz, fuzz->motions)) {
         put_template(fuzz, line, "m%m%P");
     } else {
         put_template(fuzz, line, templates[fuzz_below(fuzz, TEMPLATES)]);

@@ -1,5 +1,5 @@
 /* Lines as a user, a chattering host or a broken cable would send them: made from the grammar of all commands, those of
- * later versions too, then damaged.
+ * later versions too, then damaged. In a mode most lines are what that mode reads.
  *
  * The same seed makes the same lines on every machine. What a line ends with is left to the caller; one that was damaged
  * may hold line ends of its own. TERMINAL_PORT_DAMAGED stands for a byte that was lost.
@@ -22,6 +22,7 @@ enum { FUZZ_KEPT = 4 };
 typedef struct {
     uint64_t state;
     uint32_t motions;            /* so many in a hundred lines are motion commands */
+    uint8_t mode;                /* fuzz_mode_t */
     bool brisk;                  /* for the simulated board: most of these are short and fast, and whole */
     fuzz_line_t kept[FUZZ_KEPT]; /* lines that others are spliced with */
 } fuzz_t;

@@ -20,7 +20,7 @@ edit_t editor_take(editor_t *editor, uint8_t byte)
     const bool blank = editor->length == 0 && !editor->damaged && !editor->too_long;
     if (byte == TERMINAL_PORT_DAMAGED) {
         editor->damaged = true;
-    } else if (blank && (byte == '+' || byte == '-')) {
+    } else if (blank && !editor->in_mode && (byte == '+' || byte == '-')) {
         editor->after_return = after_return; /* such a byte is no part of any line */
         return byte == '+' ? EDIT_PULSE_CW : EDIT_PULSE_CCW;
     } else if (byte == '\r' || (byte == '\n' && !after_return)) {
@@ -119,7 +119,9 @@ static bool apply(const word_t *word, motion_command_t *command)
     }
     const uint32_t value = (uint32_t)word->whole;
     switch (word->letter) {
-    case 'm': command->count = value; return set_flag(command, MOTION_CCW, word->minus);
+    case 'm':
+        command->count = value;
+        return set_flag(command, MOTION_CCW, word->minus || (!number && settings.direction != 0));
     case 'v':
         command->velocity = number ? value : settings.cycle_us;
         return set_flag(command, MOTION_CYCLE, !number) && command->velocity > 0;
@@ -166,7 +168,7 @@ read_t reference_read(const char *text, const session_t *before, reading_t *read
         }
         last = word.letter;
         ramp |= last == 'l';
-        accel_code_t code;
+        accel_code_t code = 0;
         if ((last == 'a' || last == 'd') && !read_ramp(&word, 1, &code)) {
             return READ_REFUSED;
         }
@@ -177,11 +179,14 @@ read_t reference_read(const char *text, const session_t *before, reading_t *read
         }
     }
     const unsigned linear = (command->flags & MOTION_LINEAR) != 0;
+    accel_code_t code = 0;
     if (ramp || accel.letter != 0) {
-        (void)read_ramp(&accel, settings.accel[linear], &command->accel);
+        (void)read_ramp(&accel, settings.accel[linear], &code);
+        command->accel = code;
     }
     if (ramp || decel.letter != 0) {
-        (void)read_ramp(&decel, settings.decel[linear], &command->decel);
+        (void)read_ramp(&decel, settings.decel[linear], &code);
+        command->decel = code;
     }
     reading->session.velocity = command->velocity;
     reading->session.accel = command->accel;
@@ -192,4 +197,170 @@ read_t reference_read(const char *text, const session_t *before, reading_t *read
         return last == 'a' || last == 'd' ? READ_RAMP : READ_VALUE;
     }
     return command->count == 0 ? READ_OPEN : READ_MOTION;
+}
+
+/* -- edits ------------------------------------------------------------------------------------------------------------ */
+
+read_t reference_edit(const char *text, const motion_command_t *entry, motion_command_t *edited)
+{
+    char upto_space[LINE_CHARACTERS + 1];
+    const size_t length = strcspn(text, " ");
+    memcpy(upto_space, text, length);
+    upto_space[length] = '\0';
+    *edited = *entry;
+    word_t word, accel = {0}, decel = {0};
+    bool counted = false, unit = false, nothing = false;
+    for (const char *at = upto_space; *at != '\0';) {
+        at = read_word(at, &word);
+        accel_code_t code = 0;
+        if (at == NULL || !apply(&word, edited) || (word.letter == 'm' && !word.not_zero && !unit) ||
+            ((word.letter == 'a' || word.letter == 'd') && !read_ramp(&word, 1, &code))) {
+            return READ_REFUSED;
+        }
+        counted |= word.letter == 'm';
+        nothing |= word.letter == 'm' && !word.not_zero;
+        unit |= word.letter == 'f' || word.letter == 'p';
+        if (word.letter == 'a') {
+            accel = word;
+        } else if (word.letter == 'd') {
+            decel = word;
+        }
+    }
+    const unsigned linear = (edited->flags & MOTION_LINEAR) != 0;
+    if (accel.letter != 0) {
+        accel_code_t code = 0;
+        (void)read_ramp(&accel, settings.accel[linear], &code);
+        edited->accel = code;
+    }
+    if (decel.letter != 0) {
+        accel_code_t code = 0;
+        (void)read_ramp(&decel, settings.decel[linear], &code);
+        edited->decel = code;
+    }
+    if (counted && !unit) {
+        set_flag(edited, MOTION_PULSES, false);
+    }
+    return nothing ? READ_OPEN : READ_MOTION;
+}
+
+/* -- the configuration ------------------------------------------------------------------------------------------------ */
+
+bool reference_number(const char **text, double least, double most, uint32_t *number)
+{
+    double value = 0;
+    const char *const first = *text;
+    for (; isdigit((unsigned char)**text); ++*text) {
+        value = value * 10 + (**text - '0');
+    }
+    if (*text == first || value < least || value > most) {
+        return false;
+    }
+    *number = (uint32_t)value;
+    return true;
+}
+
+static bool read_code(const char *text, accel_code_t *code)
+{
+    const char *const point = strchr(text, '.');
+    const size_t whole = point == NULL ? strlen(text) : (size_t)(point - text);
+    const size_t behind = point == NULL ? 0 : strlen(point + 1);
+    double hundredths = 0;
+    if (strspn(text, "0123456789") != whole || behind > 2 || whole + behind + (point != NULL) == 0 ||
+        (point != NULL && strspn(point + 1, "0123456789") != behind)) {
+        return false;
+    }
+    for (size_t i = 0; i < whole; i++) {
+        hundredths = hundredths * 10 + 100 * (text[i] - '0');
+    }
+    for (size_t i = 0; i < behind; i++) {
+        hundredths += (i == 0 ? 10 : 1) * (point[1 + i] - '0');
+    }
+    if (hundredths < 1 || hundredths > (point != NULL ? 9999 : 99900)) {
+        return false;
+    }
+    *code = (accel_code_t)(hundredths < 10000 ? hundredths : hundredths / 100 - 100 + ACCEL_CODE_WHOLE);
+    return true;
+}
+
+bool reference_setting(const char *text, settings_t *stored)
+{
+    char value[LINE_CHARACTERS + 1];
+    const char letter = *text;
+    const char *at = text + 1;
+    if (letter == '\0' || letter == ' ') {
+        return false;
+    }
+    uint8_t *map = NULL;
+    if (letter == 'U') {
+        if (*at < '0' || *at > '7') {
+            return false;
+        }
+        map = &stored->driver_map[*at++ - '0'];
+    }
+    const size_t length = strcspn(at, " ");
+    memcpy(value, at, length);
+    value[length] = '\0';
+    accel_code_t code = 0;
+    if (strchr("defg", letter) != NULL) {
+        if (!read_code(value, &code)) {
+            return false;
+        }
+        switch (letter) {
+        case 'd': stored->accel[0] = code; break;
+        case 'e': stored->decel[0] = code; break;
+        case 'f': stored->accel[1] = code; break;
+        default: stored->decel[1] = code; break;
+        }
+        return true;
+    }
+    uint32_t number;
+    const char *rest = value;
+    if (!reference_number(&rest, 0, UINT32_MAX, &number) || *rest != '\0') {
+        return false;
+    }
+    const uint8_t flag = number != 0, byte = (uint8_t)number;
+    switch (letter) {
+    case 'A': stored->autorun = number > 30 ? 30 : byte; return true;
+    case 'B': stored->ramp = flag; return true;
+    case 'C': stored->internal_clock = flag; return true;
+    case 'D': stored->auto_microstep = flag; return true;
+    case 'E': stored->network = flag; return true;
+    case 'F': stored->cw_level = flag; return true;
+    case 'G': stored->direction = flag; return true;
+    case 'i': stored->soft_ops = flag; return true;
+    case 'j': stored->acknowledge = flag; return true;
+    case 'u': stored->full_step = flag; return true;
+#define WITHIN(least, most, member, is)                \
+    if (number - (least) > (most) - (least)) {         \
+        return false;                                  \
+    }                                                  \
+    stored->member = (is);                             \
+    return true
+    case 'H': WITHIN(0, 255, ihd_counts, byte);
+    case 'I': WITHIN(0, 255, xclk_counts, byte);
+    case 'J': WITHIN(0, 7, ustep, byte);
+    case 'K': WITHIN(1, 255, pulse_us, byte);
+    case 'L': WITHIN(1, 255, slow_rpm, byte);
+    case 'M': WITHIN(4, 255, device_id, byte);
+    case 'N': WITHIN(0, 2, driver_id, byte);
+    case 'k': WITHIN(0, 2, crc_mode, byte);
+    case 'a': WITHIN(1, 65535, steps_per_rev, (uint16_t)number);
+    case 'b': WITHIN(2, UINT32_MAX, cycle_us, number);
+    case 'c': WITHIN(1, 6400000, xclk_hz, number);
+    case 'm': WITHIN(300, 2000000, hw_baud, number);
+    case 'n': WITHIN(300, 38400, sw_baud, number);
+    case 'h':
+        if (number != 0 && number != 36) {
+            return false;
+        }
+        stored->ops_mask = byte;
+        return true;
+    case 'U':
+        if (number > 7) {
+            return false;
+        }
+        *map = byte;
+        return true;
+    default: return false;
+    }
 }
