@@ -74,7 +74,7 @@ void run_begin(run_t *run, setup_t setup)
     if (board_run_past(run->board, symbol(run, "store_load_settings"), TICKS_PER_S) != BOARD_MATCHED)
         die("the image does not load its settings");
     uint16_t at = symbol(run, "settings");
-    board_poke8(run->board, (uint16_t)(at + offsetof(settings_t, driver)), 2); /* has every factor */
+    board_poke8(run->board, (uint16_t)(at + offsetof(settings_t, driver_id)), 2); /* has every factor */
     board_poke8(run->board, (uint16_t)(at + offsetof(settings_t, ustep)), setup.ustep);
     board_poke8(run->board, (uint16_t)(at + offsetof(settings_t, pulse_us)), setup.pulse_us);
     board_poke32(run->board, (uint16_t)(at + offsetof(settings_t, hw_baud)), setup.baud);
