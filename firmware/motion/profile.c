@@ -40,7 +40,7 @@ status_t profile_check(const profile_basis_t *basis, const motion_command_t *com
     if (command->flags & MOTION_CYCLE) {
         if (command->velocity < shortest_us)
             return STATUS_PERIOD_TOO_SHORT;
-    } else if (command->velocity > 1000) { /* slower ones are never too fast: no division in the common case */
+    } else if (command->velocity > UINT16_MAX) { /* no division where the product below has room */
         if (inverse(basis, command) < shortest_us)
             return STATUS_PERIOD_TOO_SHORT;
     } else if (basis->us_rpm < shortest_us * command->velocity) {
