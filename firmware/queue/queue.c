@@ -195,10 +195,16 @@ status_t queue_restore(bool *saved)
 
 static void write(uint8_t position, const motion_command_t *command, bool added)
 {
-    undo = entries[position];
     undo_position = position;
     undo_added = added;
-    entries[position] = *command;
+    /* Both copies in one loop: time counts. */
+    uint8_t *to = (uint8_t *)&entries[position];
+    uint8_t *kept = (uint8_t *)&undo;
+    const uint8_t *from = (const uint8_t *)command;
+    for (uint8_t left = sizeof undo; left > 0; left--) {
+        *kept++ = *to;
+        *to++ = *from++;
+    }
 }
 
 status_t queue_add(const motion_command_t *command)
