@@ -278,17 +278,9 @@ static status_t command_release(const char *rest)
     return STATUS_OK;
 }
 
-static status_t command_pulse_cw(const char *rest)
+static status_t command_pulse(const char *rest)
 {
-    (void)rest;
-    engine_single_pulse(false);
-    return STATUS_OK;
-}
-
-static status_t command_pulse_ccw(const char *rest)
-{
-    (void)rest;
-    engine_single_pulse(true);
+    engine_single_pulse(rest[-1] == '-');
     return STATUS_OK;
 }
 
@@ -364,24 +356,13 @@ static status_t command_option(const char *rest)
     return STATUS_OK;
 }
 
-static status_t command_full_steps(const char *rest)
+/* $F, $P, $U */
+static status_t command_steps(const char *rest)
 {
-    (void)rest;
-    session_set_pulses(false);
-    return STATUS_OK;
-}
-
-static status_t command_pulses(const char *rest)
-{
-    (void)rest;
-    session_set_pulses(true);
-    return STATUS_OK;
-}
-
-static status_t command_toggle_steps(const char *rest)
-{
-    (void)rest;
     session.flags ^= MOTION_PULSES;
+    if (rest[-1] != 'U') {
+        session_set_pulses(rest[-1] == 'P');
+    }
     return STATUS_OK;
 }
 
@@ -420,7 +401,7 @@ enum {
 };
 
 const char commands_help[] FLASH =
-#define HELP(form, words) form "\t" words "\r\n"
+#define HELP(form, words) form "\t" words "\n"
 #define UNLISTED ""
 #define COMMAND(name, first, second, case_rule, argument, action, help) help
 #include "cli/commands.def"
