@@ -204,12 +204,16 @@ static status_t command_loop_bound(const char *rest)
 
 static status_t command_loop_passes(const char *rest)
 {
-    ahead.value = 0;
-    const status_t status = more(*rest) ? read_only_number(rest, &counts) : STATUS_OK;
-    if (status == STATUS_OK) {
-        queue_loop_passes(number_16());
+    uint16_t passes = 0;
+    if (more(*rest)) {
+        const status_t status = read_only_number(rest, &counts);
+        if (status != STATUS_OK) {
+            return status;
+        }
+        passes = number_16();
     }
-    return status;
+    queue_loop_passes(passes);
+    return STATUS_OK;
 }
 
 static status_t command_loop_all(const char *rest)
@@ -352,16 +356,17 @@ static status_t command_ramp(const char *rest)
 static status_t command_option(const char *rest)
 {
     const char letter = rest[-1];
-    ahead.value = 1;
+    bool on = true;
     if (more(*rest)) {
         const status_t status = read_only_number(rest, letter == 'O' ? &flags : &counts);
         if (status != STATUS_OK) {
             return status;
         }
+        on = number_16() != 0;
     } else if (letter == 'O') {
         return STATUS_OK;
     }
-    session_set_option(letter == 'O' ? SESSION_SOFT_OPS : letter == 'H' ? SESSION_CRC : SESSION_ACK, number_16() != 0);
+    session_set_option(letter == 'O' ? SESSION_SOFT_OPS : letter == 'H' ? SESSION_CRC : SESSION_ACK, on);
     return STATUS_OK;
 }
 
