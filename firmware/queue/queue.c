@@ -273,10 +273,16 @@ static bool is_continuous(void)
     return executing == QUEUE_CONTINUOUS && queue_is_executing();
 }
 
+/* It runs, or is about to. */
+static NOINLINE bool becomes_continuous(void)
+{
+    return preempting == QUEUE_CONTINUOUS || is_continuous();
+}
+
 void queue_follow(const motion_command_t *command)
 {
     motion_command_t *continuous = &entries[QUEUE_CONTINUOUS];
-    if (preempting == QUEUE_CONTINUOUS || is_continuous()) {
+    if (becomes_continuous()) {
         continuous->velocity = command->velocity;
         continuous->accel = command->accel;
         continuous->flags = (uint8_t)((continuous->flags & ~SESSION_FLAGS) | (command->flags & SESSION_FLAGS));
@@ -286,7 +292,7 @@ void queue_follow(const motion_command_t *command)
 
 void queue_throttle(int8_t rpm)
 {
-    if (preempting != QUEUE_CONTINUOUS && !is_continuous()) {
+    if (!becomes_continuous()) {
         return;
     }
     motion_command_t faster = entries[QUEUE_CONTINUOUS];
