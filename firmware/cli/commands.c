@@ -166,7 +166,7 @@ static status_t command_program_array(const char *rest)
 }
 
 /* In that mode: <entry>,<position>. */
-static status_t program_array(const char *line)
+static NOINLINE status_t program_array(const char *line)
 {
     status_t status = read_number(line, &array_entries);
     const uint8_t entry = number_8();
@@ -513,7 +513,7 @@ static NOINLINE status_t execute_by_table(const char *line)
     return dispatch(line);
 }
 
-status_t commands_execute(const char *line, uint8_t length)
+NOINLINE status_t commands_execute(const char *line, uint8_t length)
 {
     commands_read_ahead(line, length);
     const uint8_t characters = characters_ahead;
@@ -544,7 +544,7 @@ bool commands_at_once(char character)
     return true;
 }
 
-const char *commands_prompt(void)
+NOINLINE const char *commands_prompt(void)
 {
     return mode == MODE_QUEUE ? FLASH_TEXT("Q>") : mode == MODE_ARRAY ? FLASH_TEXT("X>") : FLASH_TEXT("SAC>");
 }

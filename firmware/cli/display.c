@@ -220,7 +220,7 @@ static void next_display(void)
     }
 }
 
-static uint8_t last_row(void)
+static NOINLINE uint8_t last_row(void)
 {
     return shown.session.options & SHOWN_DEBUG ? QUEUE_ONE_SHOT : QUEUE_LAST;
 }

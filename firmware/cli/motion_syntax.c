@@ -81,7 +81,7 @@ static NOINLINE void refuse_range(motion_syntax_t *syntax, const char *range)
     syntax->range = range;
 }
 
-static void open_parameter(motion_syntax_t *syntax, uint8_t parameter)
+static NOINLINE void open_parameter(motion_syntax_t *syntax, uint8_t parameter)
 {
     syntax->parameter = parameter;
     syntax->value = 0;
@@ -263,7 +263,7 @@ static void take_letter(motion_syntax_t *syntax, uint8_t letter)
     open_parameter(syntax, parameter);
 }
 
-void motion_syntax_begin(motion_syntax_t *syntax, char first_letter, const session_t *defaults)
+NOINLINE void motion_syntax_begin(motion_syntax_t *syntax, char first_letter, const session_t *defaults)
 {
     session_template(defaults, &syntax->command);
     syntax->status = STATUS_OK;

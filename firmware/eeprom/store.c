@@ -45,7 +45,7 @@ static inline struct store *self(void)
     return store;
 }
 
-static uint16_t first_sum(uint8_t mark)
+static NOINLINE uint16_t first_sum(uint8_t mark)
 {
     return (uint16_t)(mark << 8 | STORE_LAYOUT);
 }

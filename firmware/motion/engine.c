@@ -234,7 +234,7 @@ static NOINLINE uint16_t run_of(uint32_t periods)
 }
 
 /* The interrupt has repeated the last interval because the ring was empty: so many pulses fewer are to be made. */
-static NOINLINE void absorb_held(void)
+static void absorb_held(void)
 {
     uint8_t lock = atomic_begin();
     uint8_t held = step_held;
@@ -409,7 +409,7 @@ static void append_silence(uint16_t periods, uint16_t top, uint8_t flags)
     append(periods, top, (uint16_t)(top - SEGMENT_SILENT), flags);
 }
 
-static void begin_ramp(motion_state_t state)
+static NOINLINE void begin_ramp(motion_state_t state)
 {
     if (engine.ramp_state == state)
         return;
@@ -462,7 +462,7 @@ static NOINLINE uint32_t pulses_of_phase(void)
 }
 
 /* Appends what the ring has room for of the block. */
-static void emit_block(void)
+static NOINLINE void emit_block(void)
 {
     uint8_t pulses = block.pulses;
     uint8_t runs = block.runs;
@@ -991,7 +991,7 @@ void engine_release(void)
     step_port_release();
 }
 
-NOINLINE bool engine_poll(void)
+bool engine_poll(void)
 {
     bool worked = false;
     look_for_end();
@@ -1052,7 +1052,7 @@ static bool running(void)
 
 /* -- stopping ---------------------------------------------------------------------------------------------------- */
 
-static void drop_next(void)
+static NOINLINE void drop_next(void)
 {
     look_for_end();
     end_joined();

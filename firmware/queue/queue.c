@@ -42,7 +42,7 @@ static void revolution(motion_command_t *seed)
     }
 }
 
-static uint8_t after(uint8_t position)
+static NOINLINE uint8_t after(uint8_t position)
 {
     return position == QUEUE_LAST ? QUEUE_FIRST : (uint8_t)(position + 1);
 }
@@ -86,7 +86,7 @@ static void end_pass(uint8_t first)
 }
 
 /* What was chosen has begun. */
-static void advance(void)
+static NOINLINE void advance(void)
 {
     executing = choose();
     due = END_NOT;
@@ -321,7 +321,7 @@ static status_t begin_run(run_t what, uint8_t first)
     return STATUS_OK;
 }
 
-status_t queue_loop_bound(queue_bound_t bound, uint8_t position)
+NOINLINE status_t queue_loop_bound(queue_bound_t bound, uint8_t position)
 {
     if (position == bounds[1 - bound]) {
         return STATUS_LOOP_BOUNDS;
@@ -333,7 +333,7 @@ status_t queue_loop_bound(queue_bound_t bound, uint8_t position)
     return STATUS_OK;
 }
 
-status_t queue_loop_from_first(uint8_t finish)
+NOINLINE status_t queue_loop_from_first(uint8_t finish)
 {
     bounds[QUEUE_LOOP_START] = QUEUE_FIRST;
     bounds[QUEUE_LOOP_FINISH] = finish;
@@ -357,7 +357,7 @@ uint8_t queue_array(uint8_t entry)
     return array[entry];
 }
 
-status_t queue_array_run(uint16_t count)
+NOINLINE status_t queue_array_run(uint16_t count)
 {
     if (array[0] == 0) {
         return STATUS_ARRAY_EMPTY;
@@ -387,7 +387,7 @@ static void forget(void)
     engine_offer(0);
 }
 
-void queue_stop(void)
+NOINLINE void queue_stop(void)
 {
     (void)note_begun();
     forget();
@@ -437,7 +437,7 @@ bool queue_is_executing(void)
     return engine_commands_ended() != engine_commands_begun();
 }
 
-uint8_t queue_executing_position(void)
+NOINLINE uint8_t queue_executing_position(void)
 {
     return queue_is_executing() ? executing : 0;
 }
