@@ -265,6 +265,7 @@ static void take_letter(motion_syntax_t *syntax, uint8_t letter)
 
 NOINLINE void motion_syntax_begin(motion_syntax_t *syntax, char first_letter, const session_t *defaults)
 {
+    NEAR(syntax);
     session_template(defaults, &syntax->command);
     syntax->status = STATUS_OK;
     syntax->given = 0;
@@ -355,6 +356,7 @@ status_t motion_syntax_end(motion_syntax_t *syntax)
 
 void motion_syntax_keep(const motion_syntax_t *syntax, session_t *defaults)
 {
+    NEAR(defaults);
     NEAR(syntax);
     defaults->velocity = syntax->command.velocity;
     defaults->accel = syntax->command.accel;

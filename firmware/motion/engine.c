@@ -105,6 +105,7 @@ static uint16_t setup_ticks(void)
 
 static NOINLINE bool has_no_ramps(const motion_command_t *c)
 {
+    NEAR(c);
     return c->accel == ACCEL_NONE && c->decel == ACCEL_NONE;
 }
 

@@ -281,6 +281,7 @@ static NOINLINE bool becomes_continuous(void)
 
 void queue_follow(const motion_command_t *command)
 {
+    NEAR(command);
     motion_command_t *continuous = &entries[QUEUE_CONTINUOUS];
     if (becomes_continuous()) {
         continuous->velocity = command->velocity;
