@@ -1,6 +1,7 @@
 #include "drivers.h"
+#include "base/inline.h"
 
-uint8_t drivers_ustep(uint8_t driver, uint8_t ustep)
+NOINLINE uint8_t drivers_ustep(uint8_t driver, uint8_t ustep)
 {
     const uint8_t most = (uint8_t)(driver + 4); /* A4988: 16 microsteps, DRV8825: 32 */
     return driver < DRIVER_MAPPED && ustep > most ? most : ustep;

@@ -36,8 +36,9 @@ static enum { MODE_COMMANDS, MODE_QUEUE, MODE_ARRAY, MODE_CONFIGURE } mode;
 
 /* A range of numbers, and how an error names it. */
 typedef struct {
-    uint16_t least, most;
-    char text[10];
+    uint8_t least;
+    uint16_t most;
+    char text[9];
 } range_t;
 static const range_t positions FLASH = {QUEUE_FIRST, QUEUE_LAST, "1..30"};
 static const range_t array_entries FLASH = {0, QUEUE_ARRAY - 1, "0..30"};
@@ -47,6 +48,7 @@ static const range_t counts FLASH = {0, UINT16_MAX, "0..65535"};
 /* The motion command, or single value, being read ahead: how many characters of the line it has seen, 0 for none. */
 static motion_syntax_t ahead;
 static uint8_t characters_ahead;
+static const char *behind_number; /* of read_number() */
 
 /* 0 at the end of the command: of the line, or a space. */
 static uint8_t more(char c)
@@ -56,35 +58,46 @@ static uint8_t more(char c)
 
 /* -- handlers: rest is what follows the command's letters, up to the space or the end of the line --------------------- */
 
-/* The number that *rest begins with; *rest is then what follows it. */
-static NOINLINE status_t read_number(const char **rest, uint16_t *number, const range_t *range)
+/* The number that the text begins with, to ahead.value: no motion command is being read meanwhile. */
+static NOINLINE status_t read_number(const char *text, const range_t *range)
 {
-    uint32_t value = 0;
-    const char *text = *rest;
+    motion_syntax_t *read = &ahead;
+    NEAR(read);
     uint8_t digit = (uint8_t)(*text - '0');
     if (digit > 9) {
         return more(*text) ? STATUS_SYNTAX : STATUS_NUMBER_MISSING;
     }
+    read->value = 0;
     do {
-        if (!number_add_digit(&value, digit)) {
+        if (!number_add_digit(&read->value, digit)) {
             return STATUS_NUMBER_TOO_LARGE;
         }
         digit = (uint8_t)(*++text - '0');
     } while (digit <= 9);
-    *rest = text;
-    *number = (uint16_t)value;
-    if (value < flash_u16(&range->least) || value > flash_u16(&range->most)) {
-        ahead.range = range->text;
+    behind_number = text;
+    if (read->value < flash_u8(&range->least) || read->value > flash_u16(&range->most)) {
+        read->range = range->text;
         return STATUS_RANGE;
     }
     return STATUS_OK;
 }
 
 /* The same, and nothing follows it. */
-static NOINLINE status_t read_only_number(const char *rest, uint16_t *number, const range_t *range)
+static NOINLINE status_t read_only_number(const char *rest, const range_t *range)
 {
-    const status_t status = read_number(&rest, number, range);
-    return status == STATUS_OK && more(*rest) ? STATUS_SYNTAX : status;
+    const status_t status = read_number(rest, range);
+    return status == STATUS_OK && more(*behind_number) ? STATUS_SYNTAX : status;
+}
+
+/* What has been read. */
+static inline uint8_t number_8(void)
+{
+    return (uint8_t)ahead.value;
+}
+
+static inline uint16_t number_16(void)
+{
+    return (uint16_t)ahead.value;
 }
 
 /* m, and v, vc, a, d alone: all of the line has been read ahead. */
@@ -135,9 +148,8 @@ static status_t command_xref(const char *rest)
     if (!more(*rest)) {
         return STATUS_OK;
     }
-    uint16_t position;
-    const status_t status = read_only_number(rest, &position, &positions);
-    return status == STATUS_OK ? queue_preempt((uint8_t)position) : status;
+    const status_t status = read_only_number(rest, &positions);
+    return status == STATUS_OK ? queue_preempt(number_8()) : status;
 }
 
 static status_t command_run_array(const char *rest)
@@ -154,18 +166,18 @@ static status_t command_program_array(const char *rest)
 }
 
 /* In that mode: <entry>,<position>. */
-static status_t program_array(const char *line)
+static NOINLINE status_t program_array(const char *line)
 {
-    uint16_t entry, position;
-    status_t status = read_number(&line, &entry, &array_entries);
-    if (status == STATUS_OK && *line++ != ',') {
+    status_t status = read_number(line, &array_entries);
+    const uint8_t entry = number_8();
+    if (status == STATUS_OK && *behind_number != ',') {
         status = STATUS_SYNTAX;
     }
     if (status == STATUS_OK) {
-        status = read_only_number(line, &position, &array_entries);
+        status = read_only_number(behind_number + 1, &array_entries);
     }
     if (status == STATUS_OK) {
-        queue_array_set((uint8_t)entry, (uint8_t)position);
+        queue_array_set(entry, number_8());
         status = display_request(DISPLAY_ARRAY);
     }
     return status;
@@ -178,28 +190,30 @@ static status_t command_loop(const char *rest)
         queue_loop_end();
         return STATUS_OK;
     }
-    uint16_t passes;
-    const status_t status = read_only_number(rest, &passes, &counts);
-    return status == STATUS_OK ? queue_array_run(passes) : status;
+    const status_t status = read_only_number(rest, &counts);
+    return status == STATUS_OK ? queue_array_run(number_16()) : status;
 }
 
 /* ls and lf */
 static status_t command_loop_bound(const char *rest)
 {
     const queue_bound_t bound = (rest[-1] | 0x20) == 's' ? QUEUE_LOOP_START : QUEUE_LOOP_FINISH;
-    uint16_t position;
-    const status_t status = read_only_number(rest, &position, &positions);
-    return status == STATUS_OK ? queue_loop_bound(bound, (uint8_t)position) : status;
+    const status_t status = read_only_number(rest, &positions);
+    return status == STATUS_OK ? queue_loop_bound(bound, number_8()) : status;
 }
 
 static status_t command_loop_passes(const char *rest)
 {
     uint16_t passes = 0;
-    const status_t status = more(*rest) ? read_only_number(rest, &passes, &counts) : STATUS_OK;
-    if (status == STATUS_OK) {
-        queue_loop_passes(passes);
+    if (more(*rest)) {
+        const status_t status = read_only_number(rest, &counts);
+        if (status != STATUS_OK) {
+            return status;
+        }
+        passes = number_16();
     }
-    return status;
+    queue_loop_passes(passes);
+    return STATUS_OK;
 }
 
 static status_t command_loop_all(const char *rest)
@@ -225,19 +239,19 @@ static status_t command_clear_queue(const char *rest)
 /* q<position>...: an entry is edited, or with nothing more shown. */
 static status_t command_edit(const char *rest)
 {
-    uint16_t position;
-    status_t status = read_number(&rest, &position, &positions);
+    status_t status = read_number(rest, &positions);
+    const uint8_t position = number_8();
     if (status != STATUS_OK) {
         return status;
     }
-    if (!more(*rest)) {
+    if (!more(*behind_number)) {
         return display_request((display_t)(DISPLAY_ROW + position));
     }
-    motion_syntax_begin_edit(&ahead, queue_entry((uint8_t)position));
-    read_rest(rest);
+    motion_syntax_begin_edit(&ahead, queue_entry(position));
+    read_rest(behind_number);
     status = motion_syntax_end(&ahead);
     if (status == STATUS_OK) {
-        queue_edit((uint8_t)position, &ahead.command);
+        queue_edit(position, &ahead.command);
     }
     return status;
 }
@@ -278,17 +292,9 @@ static status_t command_release(const char *rest)
     return STATUS_OK;
 }
 
-static status_t command_pulse_cw(const char *rest)
+static status_t command_pulse(const char *rest)
 {
-    (void)rest;
-    engine_single_pulse(false);
-    return STATUS_OK;
-}
-
-static status_t command_pulse_ccw(const char *rest)
-{
-    (void)rest;
-    engine_single_pulse(true);
+    engine_single_pulse(rest[-1] == '-');
     return STATUS_OK;
 }
 
@@ -336,13 +342,12 @@ static status_t command_debug(const char *rest)
 
 static status_t command_ramp(const char *rest)
 {
-    uint16_t on;
     if (!more(*rest)) {
         return STATUS_OK; /* neither 0 nor 1: no change (A-SYS-02) */
     }
-    const status_t status = read_only_number(rest, &on, &flags);
+    const status_t status = read_only_number(rest, &flags);
     if (status == STATUS_OK) {
-        session_set_linear((uint8_t)on);
+        session_set_linear(number_8());
     }
     return status;
 }
@@ -351,37 +356,27 @@ static status_t command_ramp(const char *rest)
 static status_t command_option(const char *rest)
 {
     const char letter = rest[-1];
-    uint16_t on = 1;
+    bool on = true;
     if (more(*rest)) {
-        const status_t status = read_only_number(rest, &on, letter == 'O' ? &flags : &counts);
+        const status_t status = read_only_number(rest, letter == 'O' ? &flags : &counts);
         if (status != STATUS_OK) {
             return status;
         }
+        on = number_16() != 0;
     } else if (letter == 'O') {
         return STATUS_OK;
     }
-    session_set_option(letter == 'O' ? SESSION_SOFT_OPS : letter == 'H' ? SESSION_CRC : SESSION_ACK, on != 0);
+    session_set_option(letter == 'O' ? SESSION_SOFT_OPS : letter == 'H' ? SESSION_CRC : SESSION_ACK, on);
     return STATUS_OK;
 }
 
-static status_t command_full_steps(const char *rest)
+/* $F, $P, $U */
+static status_t command_steps(const char *rest)
 {
-    (void)rest;
-    session_set_pulses(false);
-    return STATUS_OK;
-}
-
-static status_t command_pulses(const char *rest)
-{
-    (void)rest;
-    session_set_pulses(true);
-    return STATUS_OK;
-}
-
-static status_t command_toggle_steps(const char *rest)
-{
-    (void)rest;
     session.flags ^= MOTION_PULSES;
+    if (rest[-1] != 'U') {
+        session_set_pulses(rest[-1] == 'P');
+    }
     return STATUS_OK;
 }
 
@@ -420,7 +415,7 @@ enum {
 };
 
 const char commands_help[] FLASH =
-#define HELP(form, words) form "\t" words "\r\n"
+#define HELP(form, words) form "\t" words "\n"
 #define UNLISTED ""
 #define COMMAND(name, first, second, case_rule, argument, action, help) help
 #include "cli/commands.def"
@@ -518,7 +513,7 @@ static NOINLINE status_t execute_by_table(const char *line)
     return dispatch(line);
 }
 
-status_t commands_execute(const char *line, uint8_t length)
+NOINLINE status_t commands_execute(const char *line, uint8_t length)
 {
     commands_read_ahead(line, length);
     const uint8_t characters = characters_ahead;
@@ -549,7 +544,7 @@ bool commands_at_once(char character)
     return true;
 }
 
-const char *commands_prompt(void)
+NOINLINE const char *commands_prompt(void)
 {
     return mode == MODE_QUEUE ? FLASH_TEXT("Q>") : mode == MODE_ARRAY ? FLASH_TEXT("X>") : FLASH_TEXT("SAC>");
 }

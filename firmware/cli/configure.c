@@ -186,7 +186,7 @@ void configure_first_cell(bool screen)
     cell = screen ? 0 : LIST_BEGIN;
 }
 
-bool configure_has_cell(void)
+NOINLINE bool configure_has_cell(void)
 {
     return cell != SCREEN_END && cell != BYTES_END && (cell != LIST_END || commands_debugging());
 }

@@ -20,13 +20,14 @@ static struct {
     uint8_t current;       /* display_t */
     uint8_t waiting_count; /* how many wait behind it */
     uint8_t waiting[DISPLAY_WAITING];
-    session_t session; /* what `cf` shows: as it was when the display began, and whether GAP testing
+    session_t session; /* what `cf` shows: as it was when the display began, and among its options whether GAP testing
                         * and debug mode were on */
 } shown;
 
-#define SHOWN_GAP (1u << 5)
-#define SHOWN_DEBUG MOTION_SYNC
-_Static_assert(((SHOWN_GAP | SHOWN_DEBUG) & SESSION_FLAGS) == 0, "flags that no session has");
+#define SHOWN_GAP (1u << 3)
+#define SHOWN_DEBUG (1u << 4)
+_Static_assert(((SHOWN_GAP | SHOWN_DEBUG) & (SESSION_SOFT_OPS | SESSION_CRC | SESSION_ACK)) == 0,
+               "options that no session has");
 
 /* -- the texts -------------------------------------------------------------------------------------------------------- */
 
@@ -49,9 +50,6 @@ _Static_assert(((SHOWN_GAP | SHOWN_DEBUG) & SESSION_FLAGS) == 0, "flags that no 
 #define ENTRY "\x8E"
 #define SETTING_CELL "\x8F"
 #define OPS "\x90"
-#define SOFT "\x91"
-#define CRC "\x92"
-#define ACKS "\x93"
 enum {
     FIELD_COUNT = 0x80,
     FIELD_RPM,
@@ -70,55 +68,60 @@ enum {
     FIELD_ENTRY,
     FIELD_SETTING_CELL,
     FIELD_OPS,
-    FIELD_SOFT,
-    FIELD_CRC,
-    FIELD_ACKS,
 };
 
-/* A choice between two texts: the first one if the command has the flag that is in these bits of the character. */
+/* A choice between two texts: the first one if the command has the flag, or from CHOICE_OPTION on the session the option,
+ * that is in the lowest bits of the character. */
 #define CHOICE(flag, set, clear) flag set "\xA0" clear "\xA1"
 #define CCW "\xC1"
 #define PULSES "\xC2"
 #define LINEAR "\xC4"
 #define SYNC "\xC8"
-#define GAP "\xE0"
-#define DEBUG SYNC
 #define THROTTLE CCW /* a session has no direction */
-enum { CHOICE_ELSE = 0xA0, CHOICE_END = 0xA1, CHOICE_BEGIN = 0xC0 };
+#define SOFT_OPS "\xE1"
+#define CRC "\xE2"
+#define ACK "\xE4"
+#define GAP "\xE8"
+#define DEBUG "\xF0"
+enum { CHOICE_ELSE = 0xA0, CHOICE_END = 0xA1, CHOICE_BEGIN = 0xC0, CHOICE_OPTION = 0xE0, CHOICE_BITS = 0x1F };
 _Static_assert(MOTION_CCW == 0x01 && MOTION_PULSES == 0x02 && MOTION_LINEAR == 0x04 && MOTION_SYNC == 0x08 &&
-                   SHOWN_GAP == 0x20,
+                   SESSION_SOFT_OPS == 0x01 && SESSION_CRC == 0x02 && SESSION_ACK == 0x04 && SHOWN_GAP == 0x08 &&
+                   SHOWN_DEBUG == 0x10,
                "the flags stand in the characters");
 
 /* Where a row ends; next_row() says how it goes on. */
 #define NEXT_ROW "\xA2"
 enum { TEXT_NEXT_ROW = 0xA2 };
 
+/* In these texts a line ends with LF; it is sent as CR LF. */
+
 /* A rule of 70 signs of equality. */
-#define RULE "=\r\n"
+#define RULE "=\n"
 enum { RULE_CHARACTERS = 70 };
 
 /* The queue: template of annex E, tab stops of 8. */
-#define QUEUE_HEAD "Q\tSteps\t\tRPM\tCycle\t Acc\tDec\tusteps\t deltaT\r\n" RULE NEXT_ROW
+#define QUEUE_HEAD "Q\tSteps\t\tRPM\tCycle\t Acc\tDec\tusteps\t deltaT\n" RULE NEXT_ROW
 /* clang-format off */
 static const char queue_text[] FLASH = QUEUE_HEAD
     ROW "\t" COUNT "\t" CHOICE(PULSES, "+", " ") CHOICE(CCW, "CCW", "CW") "\t" RPM "\t" CYCLE
-    "\t" CHOICE(LINEAR, "*", " ") ACCEL "\t" DECEL "\t" EXTRA "\t" CHOICE(SYNC, "s", " ") " " WAIT "\r\n" NEXT_ROW
-    RULE "Q is at " NEXT "\t+ pulse\t\t\t* linear\t\ts sync\r\n"
-    CHOICE(DEBUG, "executing " EXECUTING "\r\n", "");
+    "\t" CHOICE(LINEAR, "*", " ") ACCEL "\t" DECEL "\t" EXTRA "\t" CHOICE(SYNC, "s", " ") " " WAIT "\n" NEXT_ROW
+    RULE "Q is at " NEXT "\t+ pulse\t\t\t* linear\t\ts sync\n"
+    CHOICE(DEBUG, "executing " EXECUTING "\n", "");
 /* clang-format on */
 /* clang-format off */
 static const char defaults_text[] FLASH =
-    "v " RPM " cycle " CYCLE "\r\n"
-    "a " ACCEL " d " DECEL " " CHOICE(LINEAR, "linear", "harmonic") "\r\n"
-    "GAP " CHOICE(GAP, "on", "off") ", " CHOICE(PULSES, "pulses", "full step") ", " CHOICE(THROTTLE, "EnT", "EnF") "\r\n"
-    "ops " OPS ", soft_ops " SOFT ", CRC " CRC ", ACK " ACKS "\r\n";
+    "v " RPM " cycle " CYCLE "\n"
+    "a " ACCEL " d " DECEL " " CHOICE(LINEAR, "linear", "harmonic") "\n"
+    "GAP " CHOICE(GAP, "on", "off") ", " CHOICE(PULSES, "pulses", "full step") ", " CHOICE(THROTTLE, "EnT", "EnF") "\n"
+    "ops " OPS ", soft_ops " CHOICE(SOFT_OPS, "on", "off") ", CRC " CHOICE(CRC, "1", "0")
+    ", ACK " CHOICE(ACK, "on", "off") "\n";
 /* clang-format on */
 
-static const char array_text[] FLASH = "x_ " ROW " " ENTRY "\r\n" NEXT_ROW;
-static const char configure_text[] FLASH = "Config:\r\n" NEXT_ROW;
+static const char array_text[] FLASH = "x_ " ROW " " ENTRY "\n" NEXT_ROW;
+static const char configure_text[] FLASH = "Config:\n" NEXT_ROW;
 static const char cell_text[] FLASH = SETTING_CELL NEXT_ROW;
-static const char velocity_text[] FLASH = VELOCITY "\r\n";
-static const char position_text[] FLASH = "position " POSITION " " STATE " faults " FAULTS "\r\n";
+static const char velocity_text[] FLASH = VELOCITY "\n";
+static const char position_text[] FLASH = "position " POSITION " " STATE " faults " FAULTS "\n";
 
 /* What each display begins with. */
 static const char *const texts[] FLASH = {
@@ -170,12 +173,6 @@ static void print_field(uint8_t field, const motion_command_t *command)
         }
         break;
     case FIELD_OPS: number = settings.ops_mask; break;
-    case FIELD_CRC: number = (session.options & SESSION_CRC) != 0; break;
-    case FIELD_SOFT:
-    case FIELD_ACKS:
-        text_put_flash(session.options & (field == FIELD_SOFT ? SESSION_SOFT_OPS : SESSION_ACK) ? FLASH_TEXT("on")
-                                                                                               : FLASH_TEXT("off"));
-        return;
     case FIELD_SETTING_CELL: configure_put_cell(); return;
     case FIELD_STATE: text_put_flash(state_words[engine_state()]); return;
     case FIELD_ENTRY: number = queue_array(shown.row); break;
@@ -196,20 +193,18 @@ static void begin(uint8_t display)
     shown.row = 0;
     configure_first_cell(display == DISPLAY_CONFIGURE);
     shown.session = session;
-    uint8_t flags = session.flags;
     if (engine_gap()) {
-        flags |= SHOWN_GAP;
+        shown.session.options |= SHOWN_GAP;
     }
     if (commands_debugging()) {
-        flags |= SHOWN_DEBUG;
+        shown.session.options |= SHOWN_DEBUG;
         if (display == DISPLAY_QUEUE) {
             shown.row = UINT8_MAX; /* positions 0 and 31 are shown in debug mode only */
         }
     }
     if (encoder_throttles()) {
-        flags |= MOTION_CCW;
+        shown.session.flags |= MOTION_CCW;
     }
-    shown.session.flags = flags;
 }
 
 /* The display is through: the next one. */
@@ -225,9 +220,9 @@ static void next_display(void)
     }
 }
 
-static uint8_t last_row(void)
+static NOINLINE uint8_t last_row(void)
 {
-    return shown.session.flags & SHOWN_DEBUG ? QUEUE_ONE_SHOT : QUEUE_LAST;
+    return shown.session.options & SHOWN_DEBUG ? QUEUE_ONE_SHOT : QUEUE_LAST;
 }
 
 /* How it goes on behind a row. */
@@ -263,14 +258,14 @@ static NOINLINE void print_piece(void)
         command = queue_entry(shown.row);
     }
     const char *text = shown.text;
-    for (uint8_t room = TEXT_PIECE_BYTES; room > 0; room--) {
+    for (uint8_t room = TEXT_PIECE_BYTES - 1; room > 0; room--) { /* a line's end are two */
         const uint8_t character = flash_u8(text);
         if (character == '\0') {
             next_display();
             return;
         }
         if (character >= FIELD_COUNT && character < CHOICE_ELSE) {
-            if (room == TEXT_PIECE_BYTES) {
+            if (room == TEXT_PIECE_BYTES - 1) {
                 shown.text = text + 1;
                 print_field(character, command);
                 return;
@@ -288,9 +283,13 @@ static NOINLINE void print_piece(void)
         if (character == CHOICE_ELSE) {
             text = behind(text, CHOICE_END);
         } else if (character >= CHOICE_BEGIN) {
-            if (!(command->flags & character & ~CHOICE_BEGIN)) {
+            const uint8_t bits = character >= CHOICE_OPTION ? shown.session.options : command->flags;
+            if (!(uint8_t)(bits & character & CHOICE_BITS)) {
                 text = behind(text, CHOICE_ELSE);
             }
+        } else if (character == '\n') {
+            text_new_line();
+            break;
         } else if (character != CHOICE_END) {
             terminal_port_put(character);
         }

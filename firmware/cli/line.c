@@ -3,7 +3,7 @@
 
 enum { BACKSPACE = 0x08, LINE_FEED = 0x0A, CARRIAGE_RETURN = 0x0D, ESCAPE = 0x1B, SPACE = 0x20, DELETE = 0x7F };
 
-NOINLINE void line_reset(line_t *line)
+void line_reset(line_t *line)
 {
     line->length = 0;
     line->text[0] = '\0';

@@ -83,7 +83,7 @@ static NOINLINE void refuse_range(motion_syntax_t *syntax, const char *range)
     syntax->range = range;
 }
 
-static void open_parameter(motion_syntax_t *syntax, uint8_t parameter)
+static NOINLINE void open_parameter(motion_syntax_t *syntax, uint8_t parameter)
 {
     syntax->parameter = parameter;
     syntax->value = 0;
@@ -265,8 +265,9 @@ static void take_letter(motion_syntax_t *syntax, uint8_t letter)
     open_parameter(syntax, parameter);
 }
 
-void motion_syntax_begin(motion_syntax_t *syntax, char first_letter, const session_t *defaults)
+NOINLINE void motion_syntax_begin(motion_syntax_t *syntax, char first_letter, const session_t *defaults)
 {
+    NEAR(syntax);
     session_template(defaults, &syntax->command);
     syntax->status = STATUS_OK;
     syntax->given = 0;
@@ -357,6 +358,7 @@ status_t motion_syntax_end(motion_syntax_t *syntax)
 
 void motion_syntax_keep(const motion_syntax_t *syntax, session_t *defaults)
 {
+    NEAR(defaults);
     NEAR(syntax);
     defaults->velocity = syntax->command.velocity;
     defaults->accel = syntax->command.accel;

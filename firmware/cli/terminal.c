@@ -114,7 +114,7 @@ static void owe(status_t status)
 }
 
 /* Brings the screen to what the line is, as far as the port has room. */
-static NOINLINE bool echo(void)
+static bool echo(void)
 {
     bool worked = false;
     uint8_t room = terminal_port_free();

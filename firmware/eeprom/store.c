@@ -20,23 +20,32 @@ enum {
 _Static_assert(1 + SETTINGS_BYTES + CHECKSUM_BYTES <= OTHER_COPY, "a copy ends before the next one");
 _Static_assert(QUEUE_FIRST + 1 + QUEUE_BYTES + CHECKSUM_BYTES <= EEPROM_BYTES, "all fits in");
 
-/* The newest valid copy of the settings. */
-static uint8_t sequence; /* its mark; NOT_VALID: there is none */
-static uint8_t newest;   /* its address: 0 or OTHER_COPY */
+static struct store {
+    /* What is to be written: done in this order. */
+    uint8_t jobs;
+    uint8_t tries; /* to write this byte */
+    uint16_t at;   /* how far the present job has come in its round */
+    uint16_t sum;  /* until there */
+    bool changed;  /* something was not right in this round */
 
-/* What is to be written: done in this order. */
+    /* The newest valid copy of the settings. */
+    uint8_t sequence; /* its mark; NOT_VALID: there is none */
+    uint8_t newest;   /* its address: 0 or OTHER_COPY */
+
+    uint8_t change_offset, change_more;
+    uint32_t change_value;
+    const uint8_t *queue;
+} the_store;
 enum { JOB_ERASE = 1 << 0, JOB_SETTINGS = 1 << 1, JOB_QUEUE = 1 << 2 };
-static uint8_t jobs;
-static uint16_t at;   /* how far the present job has come in its round */
-static uint16_t sum;  /* until there */
-static bool changed;  /* something was not right in this round */
-static uint8_t tries; /* to write this byte */
 
-static uint8_t change_offset, change_more;
-static uint32_t change_value;
-static const uint8_t *queue;
+static inline struct store *self(void)
+{
+    struct store *store = &the_store;
+    NEAR(store);
+    return store;
+}
 
-static uint16_t first_sum(uint8_t mark)
+static NOINLINE uint16_t first_sum(uint8_t mark)
 {
     return (uint16_t)(mark << 8 | STORE_LAYOUT);
 }
@@ -55,7 +64,7 @@ static NOINLINE uint8_t valid_mark(uint8_t first, uint16_t bytes)
 
 static uint8_t next_sequence(void)
 {
-    return (uint8_t)(((sequence + 1) & SEQUENCE) | SEQUENCE_MARK);
+    return (uint8_t)(((the_store.sequence + 1) & SEQUENCE) | SEQUENCE_MARK);
 }
 
 #ifdef __AVR__
@@ -63,57 +72,60 @@ __attribute__((noinline, noclone, used, externally_visible)) /* the tests' board
 #endif
 uint8_t store_load_settings(void)
 {
-    jobs = 0;
+    struct store *const store = self();
+    store->jobs = 0;
     while (eeprom_port_busy()) {
         /* a reset other than a loss of power does not end a write: at most 3.4 ms */
     }
-    sequence = valid_mark(OTHER_COPY, SETTINGS_BYTES);
-    newest = OTHER_COPY;
+    store->sequence = valid_mark(OTHER_COPY, SETTINGS_BYTES);
+    store->newest = OTHER_COPY;
     const uint8_t other = valid_mark(0, SETTINGS_BYTES);
-    if (other != NOT_VALID && (sequence == NOT_VALID || other == next_sequence())) {
-        sequence = other;
-        newest = 0;
+    if (other != NOT_VALID && (store->sequence == NOT_VALID || other == next_sequence())) {
+        store->sequence = other;
+        store->newest = 0;
     }
     for (uint8_t i = 0; i < SETTINGS_BYTES; i++) {
         ((uint8_t *)&settings)[i] = store_setting(i);
     }
-    return sequence;
+    return store->sequence;
 }
 
 uint8_t store_setting(uint8_t i)
 {
-    return sequence == NOT_VALID ? flash_u8((const uint8_t *)&settings_factory + i)
-                                 : eeprom_port_read((uint8_t)(newest + 1 + i));
+    return the_store.sequence == NOT_VALID ? flash_u8((const uint8_t *)&settings_factory + i)
+                                           : eeprom_port_read((uint8_t)(the_store.newest + 1 + i));
 }
 
 static void begin(uint8_t job)
 {
-    jobs |= job;
-    at = 0;
-    tries = 0;
+    struct store *const store = self();
+    store->jobs |= job;
+    store->at = 0;
+    store->tries = 0;
 }
 
 status_t store_change(uint8_t offset, uint8_t more, uint32_t value)
 {
-    if (jobs & (JOB_ERASE | JOB_SETTINGS)) {
+    struct store *const store = self();
+    if (store->jobs & (JOB_ERASE | JOB_SETTINGS)) {
         return STATUS_WAIT;
     }
-    change_offset = offset;
-    change_more = more;
-    change_value = value;
+    store->change_offset = offset;
+    store->change_more = more;
+    store->change_value = value;
     begin(JOB_SETTINGS); /* a save of the queue begins anew afterwards: what it has written is not written twice */
     return STATUS_OK;
 }
 
 void store_restore_factory(void)
 {
-    jobs = 0;
+    the_store.jobs = 0;
     begin(JOB_ERASE);
 }
 
 void store_save_queue(const void *entries)
 {
-    queue = entries;
+    the_store.queue = entries;
     begin(JOB_QUEUE);
 }
 
@@ -135,37 +147,41 @@ store_queue_t store_load_queue(void *entries)
 
 uint8_t store_busy(void)
 {
-    return jobs;
+    return the_store.jobs;
 }
 
 /* Byte i of the record that the present job writes. */
 static NOINLINE uint8_t wanted_byte(uint16_t i)
 {
-    if (!(jobs & JOB_SETTINGS)) {
-        return i < STORE_QUEUE_BYTES ? queue[i] : QUEUE_MARK;
+    struct store *const store = self();
+    if (!(store->jobs & JOB_SETTINGS)) {
+        return i < STORE_QUEUE_BYTES ? store->queue[i] : QUEUE_MARK;
     }
-    const uint8_t into_change = (uint8_t)(i - change_offset);
-    return into_change <= change_more ? ((const uint8_t *)&change_value)[into_change] : store_setting((uint8_t)i);
+    const uint8_t into_change = (uint8_t)(i - store->change_offset);
+    return into_change <= store->change_more ? ((const uint8_t *)&store->change_value)[into_change]
+                                             : store_setting((uint8_t)i);
 }
 
 /* The present job is over. */
 static void end_job(void)
 {
-    jobs = (uint8_t)(jobs & (jobs - 1)); /* the lowest bit */
-    at = 0;
-    tries = 0;
+    struct store *const store = self();
+    store->jobs = (uint8_t)(store->jobs & (store->jobs - 1)); /* the lowest bit */
+    store->at = 0;
+    store->tries = 0;
 }
 
 /* Brings a cell to its value: true, and the job goes on, if it has it. */
 static bool put(uint16_t address, uint8_t value)
 {
+    struct store *const store = self();
     if (eeprom_port_read(address) == value) {
-        at++;
-        tries = 0;
+        store->at++;
+        store->tries = 0;
         return true;
     }
-    changed = true;
-    if (tries++ == STORE_TRIES) {
+    store->changed = true;
+    if (store->tries++ == STORE_TRIES) {
         end_job();
     } else {
         eeprom_port_write(address, value);
@@ -176,47 +192,49 @@ static bool put(uint16_t address, uint8_t value)
 /* The older copy of the settings, then the newer one, each from its mark on; of the snapshot too, that comes first. */
 static void erase_on(void)
 {
-    if (at == EEPROM_BYTES) {
-        sequence = NOT_VALID;
+    struct store *const store = self();
+    if (store->at == EEPROM_BYTES) {
+        store->sequence = NOT_VALID;
         end_job();
     } else {
-        put(at ^ (newest ^ OTHER_COPY), ERASED);
+        put(store->at ^ (store->newest ^ OTHER_COPY), ERASED);
     }
 }
 
 /* A round: at counts the mark (0: it only begins the sum), the bytes, the checksum; then the mark is written. */
 static void save_on(void)
 {
+    struct store *const store = self();
     uint8_t first = QUEUE_FIRST, mark = QUEUE_MARK;
     uint16_t bytes = QUEUE_BYTES;
-    if (jobs & JOB_SETTINGS) {
-        first = newest ^ OTHER_COPY;
+    if (store->jobs & JOB_SETTINGS) {
+        first = store->newest ^ OTHER_COPY;
         mark = next_sequence();
         bytes = SETTINGS_BYTES;
     }
-    if (at == 0) {
-        sum = first_sum(mark);
-        changed = false;
-        at++;
-    } else if (at <= bytes + CHECKSUM_BYTES) {
-        uint16_t address = first + at;
-        uint8_t value = (uint8_t)(sum >> 8);
-        if (at <= bytes) {
-            value = wanted_byte(at - 1);
+    if (store->at == 0) {
+        store->sum = first_sum(mark);
+        store->changed = false;
+        store->at++;
+    } else if (store->at <= bytes + CHECKSUM_BYTES) {
+        uint16_t address = first + store->at;
+        uint8_t value = (uint8_t)(store->sum >> 8);
+        if (store->at <= bytes) {
+            value = wanted_byte(store->at - 1);
         }
         if (eeprom_port_read(address) != value && eeprom_port_read(first) != NOT_VALID) {
             address = first; /* first of all */
             value = NOT_VALID;
         }
         if (put(address, value)) {
-            sum = crc16_add(sum, value);
+            store->sum = crc16_add(store->sum, value);
         }
-    } else if (changed) {
-        at = 0; /* another round */
+    } else if (store->changed) {
+        store->at = 0; /* another round */
     } else if (put(first, mark)) {
-        if (jobs & JOB_SETTINGS) {
-            sequence = mark;
-            newest = first;
+        if (store->jobs & JOB_SETTINGS) {
+            store->sequence = mark;
+            store->newest = first;
         }
         end_job();
     }
@@ -228,7 +246,7 @@ bool store_poll(void)
         return false;
     }
     if (!eeprom_port_busy()) {
-        if (jobs & JOB_ERASE) {
+        if (the_store.jobs & JOB_ERASE) {
             erase_on();
         } else {
             save_on();

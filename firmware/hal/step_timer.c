@@ -35,14 +35,14 @@ static inline void set_less_one(segment_t *segment, uint16_t periods_less_one)
     segment->count_high = (uint8_t)(periods_less_one >> 8);
 }
 
-static NOINLINE void set_compare(uint16_t top, uint16_t match)
+static void set_compare(uint16_t top, uint16_t match)
 {
     OCR1A = top;
     OCR1B = match;
 }
 
 /* Mode 0, no clock: the compare registers are written directly (section 16.7.3). */
-void step_port_init(void)
+NOINLINE void step_port_init(void)
 {
     TIMSK1 = 0;
     TCCR1B = 0;

@@ -17,9 +17,11 @@ void timebase_start(void)
 uint8_t timebase_32ms(void)
 {
     uint8_t state = atomic_begin();
-    uint16_t overflows = (uint16_t)timebase_overflows;
+    const volatile uint8_t *overflows = (const volatile uint8_t *)&timebase_overflows;
+    uint8_t low = overflows[0];
+    uint8_t high = overflows[1];
     atomic_end(state);
-    return (uint8_t)(overflows >> 5);
+    return (uint8_t)(high << 3 | low >> 5);
 }
 
 uint32_t timebase_us(void)
@@ -33,5 +35,5 @@ uint32_t timebase_us(void)
     if ((flags & _BV(TOV0)) != 0 && ticks < 128) {
         high++; /* overflowed, not yet counted */
     }
-    return high << 10 | (uint16_t)(ticks << 2);
+    return (high << 8 | ticks) << 2;
 }

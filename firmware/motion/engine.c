@@ -19,10 +19,10 @@
 #define TAIL_TICKS 320u          /* the end of the closing interval, on which a following command is joined */
 #define SHORTEST_PIECE_TICKS 128u
 #define RUN_MAX_PERIODS 65000u
-#define AHEAD_TICKS 24576u       /* silence begun before a profile with ramps is planned: 1.5 ms */
-#define AHEAD_LONG_TICKS 49152u  /* twice that, where possible */
-#define AHEAD_SHORT_TICKS 12000u /* and one without ramps */
-#define AHEAD_PERIODS 12u        /* they last; when the last one begins, the next segment must be there */
+#define AHEAD_PERIODS 12u        /* silence begun before planning; when the last one begins, the next segment is there */
+#define AHEAD_TICKS (AHEAD_PERIODS * 2048u)      /* it lasts before a profile with ramps is planned: 1.5 ms */
+#define AHEAD_LONG_TICKS (AHEAD_PERIODS * 4096u) /* twice that, where possible */
+#define AHEAD_SHORT_TICKS (AHEAD_PERIODS * 1000u) /* and one without ramps */
 #define CUT_KEEP_TICKS 49152u    /* motion left to run while a deceleration is planned */
 #define CRUISE_GROUP_TICKS 4096u /* shortest run of a cruise whose interval has a fraction */
 #define JOIN_TICKS 18000u         /* before the tail: to plan a command and emit its first intervals */
@@ -105,6 +105,7 @@ static uint16_t setup_ticks(void)
 
 static NOINLINE bool has_no_ramps(const motion_command_t *c)
 {
+    NEAR(c);
     return c->accel == ACCEL_NONE && c->decel == ACCEL_NONE;
 }
 
@@ -236,7 +237,7 @@ static NOINLINE uint16_t run_of(uint32_t periods)
 }
 
 /* The interrupt has repeated the last interval because the ring was empty: so many pulses fewer are to be made. */
-static NOINLINE void absorb_held(void)
+static void absorb_held(void)
 {
     uint8_t lock = atomic_begin();
     uint8_t held = step_held;
@@ -411,7 +412,7 @@ static void append_silence(uint16_t periods, uint16_t top, uint8_t flags)
     append(periods, top, (uint16_t)(top - SEGMENT_SILENT), flags);
 }
 
-static void begin_ramp(motion_state_t state)
+static NOINLINE void begin_ramp(motion_state_t state)
 {
     if (engine.ramp_state == state)
         return;
@@ -464,7 +465,7 @@ static NOINLINE uint32_t pulses_of_phase(void)
 }
 
 /* Appends what the ring has room for of the block. */
-static void emit_block(void)
+static NOINLINE void emit_block(void)
 {
     uint8_t pulses = block.pulses;
     uint8_t runs = block.runs;
@@ -753,18 +754,19 @@ static void take_next(void)
 }
 
 /* The first interval of most profiles is long, whatever the rest turns out to be: then the first pulse need not wait for
- * the planning. Returns how much of that interval may certainly be begun, from few operations; 0: plan first. */
+ * the planning. Returns how much of that interval may certainly be begun, from few operations, divided by AHEAD_PERIODS;
+ * 0: plan first. */
 static uint16_t certain_ticks(void)
 {
     uint32_t velocity = command.velocity;
     bool is_cycle = command.flags & MOTION_CYCLE;
     if (engine.v_in_play != basis.v_slow || is_held(&command))
         return 0;
-    uint16_t ahead = AHEAD_LONG_TICKS;
+    uint16_t ahead = AHEAD_LONG_TICKS / AHEAD_PERIODS;
     if (command.accel == ACCEL_NONE) { /* the cruise interval, or that of the deceleration */
         if (command.decel == ACCEL_NONE)
-            ahead = AHEAD_SHORT_TICKS;
-        return is_cycle && velocity >> basis.factor_log2 >= ahead / 8 ? ahead : 0;
+            ahead = AHEAD_SHORT_TICKS / AHEAD_PERIODS;
+        return is_cycle && velocity >> basis.factor_log2 >= AHEAD_PERIODS * ahead / 8 ? ahead : 0;
     }
     if (basis.slow_ticks < AHEAD_TICKS + SHORTEST_PIECE_TICKS)
         return 0;
@@ -774,7 +776,7 @@ static uint16_t certain_ticks(void)
         /* At least one step of acceleration, at slow speed. */
         least_rpm = (uint16_t)(settings.slow_rpm + 2u + (uint16_t)(accel >> 6));
         if (basis.slow_ticks < AHEAD_LONG_TICKS + SHORTEST_PIECE_TICKS)
-            ahead = AHEAD_TICKS;
+            ahead = AHEAD_TICKS / AHEAD_PERIODS;
     } else if (basis.steps_per_rev < 200 || accel > certain_centi || command.accel > command.decel) {
         /* c0 = sqrt(3.217e17 / (sprf * F * centi)) ticks is long enough; at least one step from 100 RPM on with 200 steps
          * and more, and no less of acceleration than of deceleration in a truncated profile. */
@@ -847,8 +849,9 @@ static void start_next(void)
         uint16_t lead = setup_ticks();
         uint8_t first_flags = flags;
         engine.stage = STAGE_RUN;
-        engine.ahead_ticks = certain_ticks();
-        if (engine.ahead_ticks)
+        uint16_t ahead = certain_ticks();
+        engine.ahead_ticks = (uint16_t)(ahead * AHEAD_PERIODS);
+        if (ahead)
             flags = (uint8_t)(flags | (command.accel == ACCEL_NONE ? MOTION_CRUISE : MOTION_ACCEL));
         if (wait >= SHORTEST_PIECE_TICKS) {
             append_silence(1, (uint16_t)(wait - 1), first_flags);
@@ -857,8 +860,8 @@ static void start_next(void)
             first_flags = flags; /* known at once, not only when the pulse is over */
         }
         append(1, (uint16_t)(lead - 1), engine.width_ticks, first_flags);
-        if (engine.ahead_ticks) {
-            append_silence(AHEAD_PERIODS, (uint16_t)(engine.ahead_ticks / AHEAD_PERIODS - 1), flags);
+        if (ahead) {
+            append_silence(AHEAD_PERIODS, (uint16_t)(ahead - 1), flags);
             play();
             engine_on_start();
         } else {
@@ -991,7 +994,7 @@ void engine_release(void)
     step_port_release();
 }
 
-NOINLINE bool engine_poll(void)
+bool engine_poll(void)
 {
     bool worked = false;
     look_for_end();
@@ -1052,7 +1055,7 @@ static bool running(void)
 
 /* -- stopping ---------------------------------------------------------------------------------------------------- */
 
-static void drop_next(void)
+static NOINLINE void drop_next(void)
 {
     look_for_end();
     end_joined();

@@ -7,6 +7,7 @@
 
 void profile_basis(profile_basis_t *basis, uint16_t steps_per_rev, uint8_t factor_log2, uint8_t slow_rpm)
 {
+    NEAR(basis);
     ramp_constants(&basis->ramp, steps_per_rev);
     basis->us_rpm = (uint32_t)60000000 / steps_per_rev;
     basis->steps_per_rev = steps_per_rev;
@@ -40,7 +41,7 @@ status_t profile_check(const profile_basis_t *basis, const motion_command_t *com
     if (command->flags & MOTION_CYCLE) {
         if (command->velocity < shortest_us)
             return STATUS_PERIOD_TOO_SHORT;
-    } else if (command->velocity > 1000) { /* slower ones are never too fast: no division in the common case */
+    } else if (command->velocity > UINT16_MAX) { /* no division where the product below has room */
         if (inverse(basis, command) < shortest_us)
             return STATUS_PERIOD_TOO_SHORT;
     } else if (basis->us_rpm < shortest_us * command->velocity) {
@@ -124,6 +125,7 @@ static NOINLINE uint32_t root(const wide_t *x)
 
 static NOINLINE uint32_t limited(const profile_t *profile, uint32_t v)
 {
+    NEAR(profile);
     uint32_t most = profile->v_peak;
     return (v > most) == profile->faster ? most : v;
 }
@@ -131,6 +133,7 @@ static NOINLINE uint32_t limited(const profile_t *profile, uint32_t v)
 /* The velocity that the acceleration reaches instead of v_peak, and that of its last interval: v_exit. */
 static NOINLINE void limit_peak(profile_t *profile, const profile_basis_t *basis)
 {
+    NEAR(profile);
     uint32_t v_peak = profile->v_start;
     uint32_t v_last = v_peak;
     uint32_t pulses = profile->accel_pulses;
@@ -170,6 +173,7 @@ static bool is_steep(const profile_t *profile, const profile_basis_t *basis)
 
 static NOINLINE void begin_plan(profile_t *profile, accel_code_t decel, bool linear, uint32_t v)
 {
+    NEAR(profile);
     profile->accel_pulses = 0;
     profile->cruise_pulses = 0;
     profile->linear = linear;
@@ -273,6 +277,7 @@ void profile_plan(profile_t *profile, const profile_basis_t *basis, const motion
 
 void profile_plan_decel(profile_t *profile, const profile_basis_t *basis, uint32_t v, accel_code_t decel, bool linear)
 {
+    NEAR(basis);
     begin_plan(profile, decel, linear, v);
     wide_t steps;
     ramp_steps(&steps, basis, profile, basis->v_slow, profile->decel_centi);

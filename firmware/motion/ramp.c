@@ -295,6 +295,7 @@ static void add_if(wide_t *sum, const wide_t *x, bool add)
 /* Units as fine as they can be: t below 2^30, and still below 2^31 after the next group. */
 static NOINLINE void choose_units(ramp_t *ramp)
 {
+    NEAR(ramp);
     wide_t *x = &ramp->u.linear.x;
     wide_t *c = &ramp->u.linear.c;
     for (;;) {
@@ -319,6 +320,7 @@ static NOINLINE void choose_units(ramp_t *ramp)
 /* Takes the ramp so many squares of time further, or back: by 1/16 ticks, modulo 2^32. */
 static NOINLINE uint32_t advance(ramp_t *ramp, const wide_t *squares, bool forward)
 {
+    NEAR(ramp);
     uint8_t halved = ramp->u.linear.halved;
     uint32_t before = ramp->u.linear.t;
     bool faster = ramp->faster == forward;

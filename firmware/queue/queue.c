@@ -42,7 +42,7 @@ static void revolution(motion_command_t *seed)
     }
 }
 
-static uint8_t after(uint8_t position)
+static NOINLINE uint8_t after(uint8_t position)
 {
     return position == QUEUE_LAST ? QUEUE_FIRST : (uint8_t)(position + 1);
 }
@@ -86,7 +86,7 @@ static void end_pass(uint8_t first)
 }
 
 /* What was chosen has begun. */
-static void advance(void)
+static NOINLINE void advance(void)
 {
     executing = choose();
     due = END_NOT;
@@ -195,10 +195,16 @@ status_t queue_restore(bool *saved)
 
 static void write(uint8_t position, const motion_command_t *command, bool added)
 {
-    undo = entries[position];
     undo_position = position;
     undo_added = added;
-    entries[position] = *command;
+    /* Both copies in one loop: time counts. */
+    uint8_t *to = (uint8_t *)&entries[position];
+    uint8_t *kept = (uint8_t *)&undo;
+    const uint8_t *from = (const uint8_t *)command;
+    for (uint8_t left = sizeof undo; left > 0; left--) {
+        *kept++ = *to;
+        *to++ = *from++;
+    }
 }
 
 status_t queue_add(const motion_command_t *command)
@@ -267,10 +273,17 @@ static bool is_continuous(void)
     return executing == QUEUE_CONTINUOUS && queue_is_executing();
 }
 
+/* It runs, or is about to. */
+static NOINLINE bool becomes_continuous(void)
+{
+    return preempting == QUEUE_CONTINUOUS || is_continuous();
+}
+
 void queue_follow(const motion_command_t *command)
 {
+    NEAR(command);
     motion_command_t *continuous = &entries[QUEUE_CONTINUOUS];
-    if (preempting == QUEUE_CONTINUOUS || is_continuous()) {
+    if (becomes_continuous()) {
         continuous->velocity = command->velocity;
         continuous->accel = command->accel;
         continuous->flags = (uint8_t)((continuous->flags & ~SESSION_FLAGS) | (command->flags & SESSION_FLAGS));
@@ -280,7 +293,7 @@ void queue_follow(const motion_command_t *command)
 
 void queue_throttle(int8_t rpm)
 {
-    if (preempting != QUEUE_CONTINUOUS && !is_continuous()) {
+    if (!becomes_continuous()) {
         return;
     }
     motion_command_t faster = entries[QUEUE_CONTINUOUS];
@@ -309,7 +322,7 @@ static status_t begin_run(run_t what, uint8_t first)
     return STATUS_OK;
 }
 
-status_t queue_loop_bound(queue_bound_t bound, uint8_t position)
+NOINLINE status_t queue_loop_bound(queue_bound_t bound, uint8_t position)
 {
     if (position == bounds[1 - bound]) {
         return STATUS_LOOP_BOUNDS;
@@ -321,7 +334,7 @@ status_t queue_loop_bound(queue_bound_t bound, uint8_t position)
     return STATUS_OK;
 }
 
-status_t queue_loop_from_first(uint8_t finish)
+NOINLINE status_t queue_loop_from_first(uint8_t finish)
 {
     bounds[QUEUE_LOOP_START] = QUEUE_FIRST;
     bounds[QUEUE_LOOP_FINISH] = finish;
@@ -345,7 +358,7 @@ uint8_t queue_array(uint8_t entry)
     return array[entry];
 }
 
-status_t queue_array_run(uint16_t count)
+NOINLINE status_t queue_array_run(uint16_t count)
 {
     if (array[0] == 0) {
         return STATUS_ARRAY_EMPTY;
@@ -375,7 +388,7 @@ static void forget(void)
     engine_offer(0);
 }
 
-void queue_stop(void)
+NOINLINE void queue_stop(void)
 {
     (void)note_begun();
     forget();
@@ -425,7 +438,7 @@ bool queue_is_executing(void)
     return engine_commands_ended() != engine_commands_begun();
 }
 
-uint8_t queue_executing_position(void)
+NOINLINE uint8_t queue_executing_position(void)
 {
     return queue_is_executing() ? executing : 0;
 }

@@ -6,41 +6,39 @@ session_t session;
 
 void session_init(void)
 {
-    session_set_option(SESSION_SOFT_OPS, settings.soft_ops != 0);
-    session_set_option(SESSION_CRC, settings.crc_mode != 0);
-    session_set_option(SESSION_ACK, settings.acknowledge != 0);
+    session_set_option(SESSION_SOFT_OPS, settings.soft_ops);
+    session_set_option(SESSION_CRC, settings.crc_mode);
+    session_set_option(SESSION_ACK, settings.acknowledge);
     session.velocity = settings.cycle_us;
     session.flags = MOTION_CYCLE;
     session_set_linear(settings.ramp);
     session_set_pulses(settings.full_step == 0);
 }
 
-static void set_flag(uint8_t flag, uint8_t on)
+static NOINLINE void set(uint8_t *bits, uint8_t bit, uint8_t on)
 {
-    session.flags |= flag;
+    uint8_t others = *bits | bit;
     if (!on) {
-        session.flags ^= flag;
+        others ^= bit;
     }
+    *bits = others;
 }
 
 NOINLINE void session_set_linear(uint8_t linear)
 {
-    set_flag(MOTION_LINEAR, linear);
+    set(&session.flags, MOTION_LINEAR, linear);
     session.accel = settings.accel[linear];
     session.decel = settings.decel[linear];
 }
 
-void session_set_option(uint8_t option, bool on)
+NOINLINE void session_set_option(uint8_t option, uint8_t on)
 {
-    session.options |= option;
-    if (!on) {
-        session.options ^= option;
-    }
+    set(&session.options, option, on);
 }
 
 void session_set_pulses(bool pulses)
 {
-    set_flag(MOTION_PULSES, pulses);
+    set(&session.flags, MOTION_PULSES, pulses);
 }
 
 NOINLINE void session_template(const session_t *from, motion_command_t *command)

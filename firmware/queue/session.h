@@ -36,7 +36,7 @@ void session_init(void); /* from the settings */
 /* Selects the ramp, 0 harmonic, 1 linear; accel and decel become the system defaults of that ramp (LIN-013). */
 void session_set_linear(uint8_t linear);
 
-void session_set_option(uint8_t option, bool on);
+void session_set_option(uint8_t option, uint8_t on); /* 0: off */
 
 /* Counts are pulses (true) or full steps. */
 void session_set_pulses(bool pulses);
