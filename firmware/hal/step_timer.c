@@ -114,6 +114,11 @@ void step_port_release(void)
     atomic_end(state);
 }
 
+bool step_port_held(void)
+{
+    return EIMSK & 1 << INT1;
+}
+
 bool estop_port_active(void)
 {
     return !(EIMSK & 1 << INT0) || !(PIND & 1 << 2);

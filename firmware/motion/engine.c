@@ -905,8 +905,8 @@ static void join_next(void)
         return;
     }
     const motion_command_t *next = engine.next;
-    if (is_held(next))
-        return; /* after its end */
+    if (is_held(next) || step_port_held())
+        return; /* after its end; not before the running one may begin */
     uint32_t ticks; /* until the tail begins */
     if (loaded == offset) {
         /* It is loaded: what is left of the period before it. */

@@ -818,6 +818,22 @@ static void test_graceful_next_without_deceleration_leaves_the_velocity_in_play(
         TEST_ASSERT_UINT64_WITHIN(10, 3000 * US, step_player_interval(k)); /* speed in hundredths of an RPM */
 }
 
+/* NXT-001, SYN-001: also where it is so short that what follows would be joined to it. */
+static void test_nothing_is_begun_before_a_held_command_has_been_released(void)
+{
+    motion_command_t held = cycle_move(3, 1400, 999, 999);
+    held.flags |= MOTION_SYNC;
+    submit(held);
+    const motion_command_t next = move(-100, 100, 1, 1);
+    engine_offer(&next);
+    run_for(1000000);
+    TEST_ASSERT_TRUE(can_offer());
+    TEST_ASSERT_TRUE(engine_next(true));
+    engine_offer(&next); /* as the queue does it all the time */
+    run_to_end();
+    assert_ended_at(-100);
+}
+
 /* NXT-003 */
 static void test_next_with_nothing_queued_ends_in_standby(void)
 {
@@ -1110,6 +1126,7 @@ int main(void)
     RUN_TEST(test_next_ends_the_command_and_goes_on_with_the_queued_one);
     RUN_TEST(test_graceful_next_goes_on_with_the_queued_command);
     RUN_TEST(test_graceful_next_without_deceleration_leaves_the_velocity_in_play);
+    RUN_TEST(test_nothing_is_begun_before_a_held_command_has_been_released);
     RUN_TEST(test_next_with_nothing_queued_ends_in_standby);
     RUN_TEST(test_single_pulses_are_stacked_in_both_directions);
     RUN_TEST(test_a_single_pulse_is_one_edge_whatever_the_microsteps);
