@@ -864,7 +864,7 @@ static void start_next(void)
         }
         add_pulses(flags, 1);
     } else {
-        for (uint8_t steps = 4; steps > 0; steps--)
+        for (uint8_t steps = 4; steps > 0 && engine.stage == STAGE_LEAD; steps--)
             emit(); /* sets the wait up, then its silence, then the pulse */
         if (!held)
             play();

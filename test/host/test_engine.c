@@ -632,6 +632,19 @@ static void test_the_start_wait_counts_from_the_start_in_microseconds(void)
     }
 }
 
+/* Of a wait that fits one period the pulse is in the ring one step earlier than of others. */
+static void test_no_pulse_is_lost_behind_a_start_wait_of_any_length(void)
+{
+    for (uint32_t us = 2900; us < 9000; us += 100) {
+        setUp();
+        motion_command_t c = cycle_move(4, 1800, 999, 999);
+        c.start_wait_us = us;
+        submit(c);
+        run_to_end();
+        assert_ended_at(4);
+    }
+}
+
 /* SWT-001, SWT-006 */
 static void test_the_start_wait_counts_from_the_end_of_the_command_before(void)
 {
@@ -1117,6 +1130,7 @@ int main(void)
     RUN_TEST(test_one_step_of_deceleration_returns_to_slow_speed);
     RUN_TEST(test_a_start_wait_longer_than_the_gap_is_a_start_from_slow_speed);
     RUN_TEST(test_the_start_wait_counts_from_the_start_in_microseconds);
+    RUN_TEST(test_no_pulse_is_lost_behind_a_start_wait_of_any_length);
     RUN_TEST(test_the_start_wait_counts_from_the_end_of_the_command_before);
     RUN_TEST(test_a_stop_ends_a_wait_and_a_long_interval_at_once);
     RUN_TEST(test_a_stop_is_followed_by_no_edge_and_loses_none);
