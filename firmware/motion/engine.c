@@ -691,6 +691,7 @@ static void drop_emission(void)
     engine.ahead_ticks = 0;
     engine.ramp_state = MOTION_STANDBY;
     engine.tail_awaited = false;
+    engine.dir_due = false;
 }
 
 /* -- starting and joining ----------------------------------------------------------------------------------------- */
@@ -706,7 +707,6 @@ static void begin_ring(void)
     step_idle = 0;
     engine.owed = 0;
     engine.carry_q16 = 0;
-    engine.dir_due = false;
     engine.joined = 0;
     engine.single = false;
     drop_emission();
@@ -1050,24 +1050,16 @@ static bool running(void)
 
 /* -- stopping ---------------------------------------------------------------------------------------------------- */
 
-static void drop_next(void)
-{
-    look_for_end();
-    end_joined();
-    engine.next = 0;
-}
-
 /* Freezes the pulse train where it is. */
 static void halt(void)
 {
     if (!engine.playing)
         return;
     step_port_halt();
-    if (running()) {
-        engine.ended++;
-        if (motion_state != MOTION_STANDBY)
-            engine.played++;
-    }
+    if (running() && motion_state != MOTION_STANDBY)
+        engine.played++;
+    engine.ended = engine.begun;
+    engine.joined = 0;
     engine.emitted = engine_position();
     engine.playing = false;
     drop_emission();
@@ -1077,7 +1069,7 @@ static void halt(void)
 
 void engine_stop(void)
 {
-    drop_next();
+    engine.next = 0;
     halt();
     forget_velocity();
 }
@@ -1088,10 +1080,12 @@ static uint32_t cut(void)
 {
     allow_hold(0);
     step_snapshot_t at = step_port_snapshot();
-    uint8_t offset = (uint8_t)(at.tail - SEGMENT_BYTES);
+    uint8_t first = (uint8_t)(at.tail - SEGMENT_BYTES);
+    uint8_t offset = first;
     uint16_t left = at.to_count;
     uint32_t keep_ticks = CUT_KEEP_TICKS;
     const segment_t *s;
+    uint8_t to_joint = (uint8_t)(engine.joined_offset - first);
     for (;;) {
         s = segment_at(offset);
         uint32_t ticks = ticks_of(s, left);
@@ -1118,7 +1112,31 @@ static uint32_t cut(void)
     int32_t dropped = pulses_from((uint8_t)(offset + SEGMENT_BYTES));
     engine.emitted -= dropped + signed_pulses(s, step_port_shorten(offset, left));
     drop_emission();
+    if ((uint8_t)(offset - first) < to_joint) { /* what was joined never begins */
+        engine.ended = (uint8_t)(engine.ended + engine.joined);
+        engine.joined = 0;
+    }
+    command.flags = (uint8_t)((command.flags & ~MOTION_CCW) | (s->flags & 1 << SEGMENT_CCW_BIT ? MOTION_CCW : 0));
     return interval_ticks;
+}
+
+/* The next command shall not begin: the running one, which ends soon, is not joined any more, if there is time. */
+static NOINLINE bool part(void)
+{
+    uint8_t offset = engine.joined_offset;
+    int32_t dropped = pulses_from(offset);
+    if (!engine.joined || (segment_at(offset)->flags & SEGMENT_STATE_MASK) != MOTION_STOP ||
+        !step_port_arm(offset, (uint16_t)(engine.tail_ticks - 1), SEGMENT_SILENT, MOTION_STOP))
+        return false;
+    engine.emitted -= dropped;
+    drop_emission();
+    engine.tail_offset = offset;
+    engine.tail_awaited = true;
+    engine.joined--;
+    engine.ended++;
+    engine.stage = STAGE_GAP;
+    forget_velocity();
+    return true;
 }
 
 /* Ends the running command with a deceleration, or none. */
@@ -1127,11 +1145,13 @@ static void end_command(accel_code_t decel, bool linear)
     if (!running())
         return;
     motion_state_t state = engine_state();
-    if (state == MOTION_STOP || (state == MOTION_DECEL && decel != ACCEL_NONE))
+    if ((state == MOTION_STOP || (state == MOTION_DECEL && decel != ACCEL_NONE)) && (!engine.joined || part()))
         return; /* ending already */
     uint32_t ticks = state == MOTION_STANDBY ? 0 : cut();
     if (ticks == 0) {
-        if (state == MOTION_STANDBY || engine.stage == STAGE_RUN || engine.silence_chunks || engine.piece_ticks) {
+        if (part())
+            return;
+        if (state == MOTION_STANDBY || engine.joined || engine.stage == STAGE_RUN || engine.silence_chunks || engine.piece_ticks) {
             /* In a start wait or at slow speed: there is nothing to ramp down from. */
             halt();
             forget_velocity();
@@ -1150,7 +1170,7 @@ static void end_command(accel_code_t decel, bool linear)
 
 void engine_stop_graceful(accel_code_t decel, bool linear)
 {
-    drop_next();
+    engine.next = 0;
     end_command(decel, linear);
 }
 
