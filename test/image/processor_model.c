@@ -1048,6 +1048,8 @@ static bool is(const processor_t *p, const world_t *w, processor_condition_t con
         return w->now.present && w->now.held;
     case PROCESSOR_LOOPS:
         return in_loop(w);
+    case PROCESSOR_ARRAY:
+        return w->array_looping;
     case PROCESSOR_CONTINUOUS:
         return w->preempting == 1 || (w->now.present && w->now.continuous);
     case PROCESSOR_ENDING:

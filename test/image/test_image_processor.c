@@ -412,7 +412,7 @@ static bool act(void)
         return true;
     case 14:
     case 15:
-        if (!(features & LOOP) || continuous)
+        if (!(features & LOOP) || continuous || may(PROCESSOR_ARRAY))
             return false;
         if (!looping && !may(PROCESSOR_HALF_LOOP)) {
             type_loop();
