@@ -208,7 +208,6 @@ static void write(uint8_t position, const motion_command_t *command, bool added)
 
 status_t queue_add(const motion_command_t *command)
 {
-    (void)note_begun();
     if (estop_port_active()) {
         return STATUS_ESTOP;
     }
@@ -229,7 +228,6 @@ void queue_edit(uint8_t position, const motion_command_t *command)
 
 status_t queue_undo(void)
 {
-    (void)note_begun();
     const uint8_t position = undo_position;
     if (position == 0 || position == queue_executing_position()) {
         return STATUS_NOTHING_TO_UNDO;
@@ -255,7 +253,6 @@ status_t queue_preempt(uint8_t position)
 
 status_t queue_preempt_with(uint8_t position, const motion_command_t *command)
 {
-    (void)note_begun();
     if (estop_port_active()) {
         return STATUS_ESTOP;
     }
@@ -268,7 +265,6 @@ status_t queue_preempt_with(uint8_t position, const motion_command_t *command)
 
 static bool is_continuous(void)
 {
-    (void)note_begun();
     return executing == QUEUE_CONTINUOUS && queue_is_executing();
 }
 
@@ -302,7 +298,6 @@ void queue_throttle(int8_t rpm)
 
 static status_t begin_run(run_t what)
 {
-    (void)note_begun();
     if (estop_port_active()) {
         end_loop();
         return STATUS_ESTOP;
@@ -340,7 +335,6 @@ void queue_loop_passes(uint16_t count)
 
 void queue_array_set(uint8_t entry, uint8_t position)
 {
-    (void)note_begun();
     array[entry] = position;
     (void)offer();
 }
@@ -382,14 +376,12 @@ static void forget(void)
 
 void queue_stop(void)
 {
-    (void)note_begun();
     forget();
     engine_stop();
 }
 
 void queue_stop_graceful(accel_code_t decel, bool linear)
 {
-    (void)note_begun();
     forget();
     engine_stop_graceful(decel, linear);
 }
@@ -398,7 +390,6 @@ void queue_stop_graceful(accel_code_t decel, bool linear)
  * continuous motion is, it shall end too; and a loop that it has interrupted executes one more command. */
 static void end_running(end_t how)
 {
-    (void)note_begun();
     if (!engine_next(how == END_GRACEFULLY) && is_continuous()) {
         due = how;
     }

@@ -653,6 +653,11 @@ static void close_set(processor_t *p, uint64_t cycle)
                 applied.inputs++;
                 apply(p, &applied, in, (early ? in->cycle : p->last_rise) + in->takes + TAIL);
                 add(p, &applied);
+                if ((in->kind == NEXT_NOW || in->kind == NEXT_RAMP) && between && w.now.present && !w.now.continuous) {
+                    applied = w; /* it was for the one before, which ended soon */
+                    applied.inputs++;
+                    add(p, &applied);
+                }
                 if (in->kind == SINGLE && !w.now.present && in->cycle <= w.moving_until) {
                     applied = w; /* ignored */
                     applied.inputs++;
