@@ -1145,13 +1145,13 @@ static void end_command(accel_code_t decel, bool linear)
     if (!running())
         return;
     motion_state_t state = engine_state();
-    if ((state == MOTION_STOP || (state == MOTION_DECEL && decel != ACCEL_NONE)) && (!engine.joined || part()))
+    if (state == MOTION_DECEL && decel != ACCEL_NONE && (!engine.joined || part()))
         return; /* ending already */
     uint32_t ticks = state == MOTION_STANDBY ? 0 : cut();
     if (ticks == 0) {
         if (part())
             return;
-        if (state == MOTION_STANDBY || engine.joined || engine.stage == STAGE_RUN || engine.silence_chunks || engine.piece_ticks) {
+        if (state == MOTION_STANDBY || engine.joined || !engine.tail_awaited) {
             /* In a start wait or at slow speed: there is nothing to ramp down from. */
             halt();
             forget_velocity();
@@ -1177,7 +1177,7 @@ void engine_stop_graceful(accel_code_t decel, bool linear)
 bool engine_next(bool graceful)
 {
     look_for_end();
-    if (engine.joined)
+    if (engine.joined || engine_state() == MOTION_STOP) /* (also that of the command before) */
         return false;
     end_command(graceful ? command.decel : ACCEL_NONE, (command.flags & MOTION_LINEAR) != 0);
     return true;
