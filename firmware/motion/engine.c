@@ -194,10 +194,10 @@ static void add_pulses(uint8_t flags, uint16_t pulses)
 }
 
 /* Is the one-period segment at `offset` being played, or over? (It is loaded one period before it begins, and what comes
- * after it when it begins.) */
+ * after it when it begins. With the timer idle, all that was loaded has begun.) */
 static bool has_begun(uint8_t offset)
 {
-    return step_idle || (uint8_t)(step_head - offset) > (uint8_t)(step_head - step_tail + SEGMENT_BYTES);
+    return (uint8_t)(step_head - offset) > (uint8_t)(step_head - step_tail + (step_idle ? 0 : SEGMENT_BYTES));
 }
 
 static void end_joined(void)

@@ -847,6 +847,22 @@ static void test_nothing_is_begun_before_a_held_command_has_been_released(void)
     assert_ended_at(-100);
 }
 
+/* What is in the ring has not been played because the timer has nothing to do. */
+static void test_a_command_has_not_ended_where_the_planner_was_late(void)
+{
+    settings.slow_rpm = 200;
+    engine_init();
+    submit(move(7, 250, 50, 50));
+    step_player_advance(16000000);
+    TEST_ASSERT_TRUE(step_idle);
+    while (step_idle)
+        engine_poll();
+    TEST_ASSERT_EQUAL_UINT8(0, ended());
+    run_to_end();
+    assert_ended_at(7);
+    TEST_ASSERT_EQUAL_UINT8(1, ended());
+}
+
 /* NXT-003 */
 static void test_next_with_nothing_queued_ends_in_standby(void)
 {
@@ -1155,5 +1171,6 @@ int main(void)
     RUN_TEST(test_a_steep_linear_ramp_from_standstill_speeds_up_and_slows_down);
     RUN_TEST(test_no_motion_so_far_has_starved);
     RUN_TEST(test_a_planner_that_is_too_slow_neither_adds_nor_loses_a_pulse);
+    RUN_TEST(test_a_command_has_not_ended_where_the_planner_was_late);
     return UNITY_END();
 }
