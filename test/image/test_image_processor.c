@@ -4,7 +4,7 @@
  * In the environment:
  *   SAC_SCRIPTS           how many scripts (make test-processor: 2,000)
  *   SAC_SCRIPT_SEED       the only one to be run: that of a failure; it is run again in words
- *   SAC_SCRIPT_FEATURES   which groups of commands, e.g. loop,xref; "all"; what every version has is always on */
+ *   SAC_SCRIPT_FEATURES   which groups of commands only, e.g. loop,xref; "all"; the rest is always on */
 #include "image.h"
 #include "processor_model.h"
 
@@ -18,8 +18,8 @@
 #define MOST_LINES 22
 #define QUIET (12 * MS) /* when a command that ends or begins has surely done so */
 
-/* The groups that the firmware has: scripts use them without being asked to. */
-#define FEATURES 0u
+/* The groups that scripts use without being asked to. */
+#define FEATURES (LOOP | XREF | ONESHOT | CONTINUOUS | SYNC | EDIT | ESTOP)
 
 enum { LOOP = 1 << 0, XREF = 1 << 1, ONESHOT = 1 << 2, CONTINUOUS = 1 << 3, SYNC = 1 << 4, EDIT = 1 << 5, ESTOP = 1 << 6 };
 static const struct {
@@ -34,6 +34,7 @@ static const struct {
 static unsigned features;
 static processor_t *model;
 static unsigned not_followed;
+static unsigned starved; /* scripts in which the planner was late (docs/design.md, known failures) */
 static size_t fed; /* pulses that the model has seen */
 static unsigned long seed;
 static uint64_t random_state;
@@ -488,6 +489,10 @@ static void finish(void)
     }
     image_idle(5 * SECOND);
     follow();
+    for (size_t shown = 0; shown != strlen(board_uart_text(board));) { /* what is still owed to the screen */
+        shown = strlen(board_uart_text(board));
+        image_run(5 * MS);
+    }
     static const char *const unknown[] = {"?1 ", "?2 ", "?9 "};
     for (size_t i = 0; i < 3; i++)
         if (strstr(board_uart_text(board), unknown[i]))
@@ -555,8 +560,9 @@ static void run_script(unsigned long number)
     finish();
     unsigned faults;
     int32_t position = image_position_and_faults(&faults);
-    if (faults != 0)
-        part("expected no faults, saw %u", faults);
+    if (faults & ~1u)
+        part("expected no faults but late planning, saw %u", faults);
+    starved += faults;
     if (position != train.position)
         part("expected position %lld as the edges say, saw %ld", (long long)train.position, (long)position);
     if (processor_gave_up(model))
@@ -581,6 +587,8 @@ static void test_random_scripts_make_the_pulses_that_the_model_of_the_command_pr
     unsigned long scripts = many ? strtoul(many, NULL, 10) : SCRIPTS;
     for (unsigned long i = 1; i <= scripts; i++)
         run_script(i);
+    if (starved > scripts / 100 + 1)
+        image_fail("in %u of %lu scripts the planner was late", starved, scripts);
     if (not_followed > scripts / 100)
         image_fail("%u of %lu scripts have too many states to be followed", not_followed, scripts);
 }
@@ -690,9 +698,9 @@ static void test_small_s_at_a_joint_ends_all_and_keeps_position_and_direction(vo
 
 int main(void)
 {
-    features = FEATURES;
     known_failures = getenv("SAC_KNOWN_FAILURES") != NULL;
     const char *asked = getenv("SAC_SCRIPT_FEATURES");
+    features = asked ? 0 : FEATURES;
     for (size_t i = 0; asked && i < sizeof groups / sizeof groups[0]; i++)
         if (strstr(asked, groups[i].name) || strcmp(asked, "all") == 0)
             features |= groups[i].bit;
