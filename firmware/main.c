@@ -73,8 +73,8 @@ int main(void)
             worked = terminal_poll(); /* first: a line's end is what wakes a unit at rest, and its motion is awaited */
         }
         worked |= encoder_poll();
-        worked |= queue_poll();
         worked |= engine_poll();
+        worked |= queue_poll(); /* it knows what has begun before anybody asks or changes it */
         ops_poll();
         worked |= store_poll();
         if (!worked) {

@@ -114,6 +114,11 @@ void step_port_release(void)
     atomic_end(state);
 }
 
+bool step_port_held(void)
+{
+    return EIMSK & 1 << INT1;
+}
+
 bool estop_port_active(void)
 {
     return !(EIMSK & 1 << INT0) || !(PIND & 1 << 2);
@@ -159,11 +164,11 @@ void step_port_halt(void)
         uint8_t tail = step_tail;
         const segment_t *loaded = segment_at((uint8_t)(tail - SEGMENT_BYTES));
         const segment_t *before = segment_at((uint8_t)(tail - 2 * SEGMENT_BYTES));
-        bool fast = loaded->top < SEGMENT_EARLY1_BELOW_TICKS || before->top < SEGMENT_EARLY1_BELOW_TICKS;
         uint8_t low = GPIOR0;
         const segment_t *s = loaded;
         if (low == s->count_low && GPIOR1 == s->count_high)
             s = before; /* its last period is running */
+        bool fast = s->top < SEGMENT_EARLY1_BELOW_TICKS;
         uint16_t match = s->match;
         cli();
         if (TCCR1B == MODE15_B) {

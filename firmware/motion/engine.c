@@ -197,10 +197,10 @@ static void add_pulses(uint8_t flags, uint16_t pulses)
 }
 
 /* Is the one-period segment at `offset` being played, or over? (It is loaded one period before it begins, and what comes
- * after it when it begins.) */
+ * after it when it begins. With the timer idle, all that was loaded has begun.) */
 static bool has_begun(uint8_t offset)
 {
-    return step_idle || (uint8_t)(step_head - offset) > (uint8_t)(step_head - step_tail + SEGMENT_BYTES);
+    return (uint8_t)(step_head - offset) > (uint8_t)(step_head - step_tail + (step_idle ? 0 : SEGMENT_BYTES));
 }
 
 static void end_joined(void)
@@ -694,6 +694,7 @@ static void drop_emission(void)
     engine.ahead_ticks = 0;
     engine.ramp_state = MOTION_STANDBY;
     engine.tail_awaited = false;
+    engine.dir_due = false;
 }
 
 /* -- starting and joining ----------------------------------------------------------------------------------------- */
@@ -709,7 +710,6 @@ static void begin_ring(void)
     step_idle = 0;
     engine.owed = 0;
     engine.carry_q16 = 0;
-    engine.dir_due = false;
     engine.joined = 0;
     engine.single = false;
     drop_emission();
@@ -869,7 +869,7 @@ static void start_next(void)
         }
         add_pulses(flags, 1);
     } else {
-        for (uint8_t steps = 4; steps > 0; steps--)
+        for (uint8_t steps = 4; steps > 0 && engine.stage == STAGE_LEAD; steps--)
             emit(); /* sets the wait up, then its silence, then the pulse */
         if (!held)
             play();
@@ -910,8 +910,8 @@ static void join_next(void)
         return;
     }
     const motion_command_t *next = engine.next;
-    if (is_held(next))
-        return; /* after its end */
+    if (is_held(next) || step_port_held())
+        return; /* after its end; not before the running one may begin */
     uint32_t ticks; /* until the tail begins */
     if (loaded == offset) {
         /* It is loaded: what is left of the period before it. */
@@ -1055,24 +1055,16 @@ static bool running(void)
 
 /* -- stopping ---------------------------------------------------------------------------------------------------- */
 
-static NOINLINE void drop_next(void)
-{
-    look_for_end();
-    end_joined();
-    engine.next = 0;
-}
-
 /* Freezes the pulse train where it is. */
 static void halt(void)
 {
     if (!engine.playing)
         return;
     step_port_halt();
-    if (running()) {
-        engine.ended++;
-        if (motion_state != MOTION_STANDBY)
-            engine.played++;
-    }
+    if (running() && motion_state != MOTION_STANDBY)
+        engine.played++;
+    engine.ended = engine.begun;
+    engine.joined = 0;
     engine.emitted = engine_position();
     engine.playing = false;
     drop_emission();
@@ -1082,7 +1074,7 @@ static void halt(void)
 
 void engine_stop(void)
 {
-    drop_next();
+    engine.next = 0;
     halt();
     forget_velocity();
 }
@@ -1093,10 +1085,12 @@ static uint32_t cut(void)
 {
     allow_hold(0);
     step_snapshot_t at = step_port_snapshot();
-    uint8_t offset = (uint8_t)(at.tail - SEGMENT_BYTES);
+    uint8_t first = (uint8_t)(at.tail - SEGMENT_BYTES);
+    uint8_t offset = first;
     uint16_t left = at.to_count;
     uint32_t keep_ticks = CUT_KEEP_TICKS;
     const segment_t *s;
+    uint8_t to_joint = (uint8_t)(engine.joined_offset - first);
     for (;;) {
         s = segment_at(offset);
         uint32_t ticks = ticks_of(s, left);
@@ -1123,7 +1117,31 @@ static uint32_t cut(void)
     int32_t dropped = pulses_from((uint8_t)(offset + SEGMENT_BYTES));
     engine.emitted -= dropped + signed_pulses(s, step_port_shorten(offset, left));
     drop_emission();
+    if ((uint8_t)(offset - first) < to_joint) { /* what was joined never begins */
+        engine.ended = (uint8_t)(engine.ended + engine.joined);
+        engine.joined = 0;
+    }
+    command.flags = (uint8_t)((command.flags & ~MOTION_CCW) | (s->flags & 1 << SEGMENT_CCW_BIT ? MOTION_CCW : 0));
     return interval_ticks;
+}
+
+/* The next command shall not begin: the running one, which ends soon, is not joined any more, if there is time. */
+static NOINLINE bool part(void)
+{
+    uint8_t offset = engine.joined_offset;
+    int32_t dropped = pulses_from(offset);
+    if (!engine.joined || (segment_at(offset)->flags & SEGMENT_STATE_MASK) != MOTION_STOP ||
+        !step_port_arm(offset, (uint16_t)(engine.tail_ticks - 1), SEGMENT_SILENT, MOTION_STOP))
+        return false;
+    engine.emitted -= dropped;
+    drop_emission();
+    engine.tail_offset = offset;
+    engine.tail_awaited = true;
+    engine.joined--;
+    engine.ended++;
+    engine.stage = STAGE_GAP;
+    forget_velocity();
+    return true;
 }
 
 /* Ends the running command with a deceleration, or none. */
@@ -1132,11 +1150,13 @@ static void end_command(accel_code_t decel, bool linear)
     if (!running())
         return;
     motion_state_t state = engine_state();
-    if (state == MOTION_STOP || (state == MOTION_DECEL && decel != ACCEL_NONE))
+    if (state == MOTION_DECEL && decel != ACCEL_NONE && (!engine.joined || part()))
         return; /* ending already */
     uint32_t ticks = state == MOTION_STANDBY ? 0 : cut();
     if (ticks == 0) {
-        if (state == MOTION_STANDBY || engine.stage == STAGE_RUN || engine.silence_chunks || engine.piece_ticks) {
+        if (part())
+            return;
+        if (state == MOTION_STANDBY || engine.joined || !engine.tail_awaited) {
             /* In a start wait or at slow speed: there is nothing to ramp down from. */
             halt();
             forget_velocity();
@@ -1155,14 +1175,14 @@ static void end_command(accel_code_t decel, bool linear)
 
 void engine_stop_graceful(accel_code_t decel, bool linear)
 {
-    drop_next();
+    engine.next = 0;
     end_command(decel, linear);
 }
 
 bool engine_next(bool graceful)
 {
     look_for_end();
-    if (engine.joined)
+    if (engine.joined || engine_state() == MOTION_STOP) /* (also that of the command before) */
         return false;
     end_command(graceful ? command.decel : ACCEL_NONE, (command.flags & MOTION_LINEAR) != 0);
     return true;

@@ -20,6 +20,7 @@ void step_port_start(void);
 /* The same, but the timer stands ready until step_port_release() or a falling edge of the sync pin. */
 void step_port_hold(void);
 void step_port_release(void); /* with nothing held, nothing happens */
+bool step_port_held(void);    /* it stands ready still */
 
 /* Stops the timer at once, except that a pulse which has begun or is about to is completed first. No edge comes after
  * the return; step_port_snapshot() then tells where it stopped. */

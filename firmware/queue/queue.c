@@ -14,7 +14,7 @@ typedef enum { RUN_NOTHING, RUN_LOOP, RUN_ARRAY } run_t;
 typedef enum { END_NOT, END_NOW, END_GRACEFULLY } end_t;
 
 static motion_command_t entries[QUEUE_POSITIONS];
-static uint8_t array[QUEUE_ARRAY];
+static uint8_t array[QUEUE_ARRAY + 1]; /* the last one stays 0 */
 static uint8_t next_available; /* 1..30 */
 static uint8_t pending;        /* 0..30: the entries before it */
 static uint8_t preempting;     /* position that comes before all others, or NONE */
@@ -23,7 +23,7 @@ static uint8_t executing;      /* position of the command begun last */
 static uint8_t begun;          /* engine_commands_begun() that `executing` belongs to */
 
 static run_t run;
-static uint8_t at;         /* comes next: of the loop a position, of the array an entry */
+static uint8_t at;         /* of the loop the position begun last, of the array the entry after it; 0: none yet */
 static uint8_t bounds[2];  /* of the loop, by queue_bound_t; 0: not known */
 static uint16_t passes;    /* still to be made; 0: endless */
 static bool last_of_loop;  /* one more command, then it ends */
@@ -55,34 +55,35 @@ static void end_loop(void)
     passes = 0;
 }
 
+/* Is what has begun of the loop or the array the last one of a pass ... */
+static NOINLINE bool ends_pass(void)
+{
+    return run == RUN_LOOP ? at == bounds[QUEUE_LOOP_FINISH] : array[at] == 0;
+}
+
+/* ... and of all? As bounds and array are now. */
+static NOINLINE bool is_over(void)
+{
+    return ends_pass() && (passes == 1 || (run == RUN_ARRAY && array[0] == 0));
+}
+
 /* The command that comes next; NONE if there is none. */
 static uint8_t choose(void)
 {
     if (preempting != NONE) {
         return preempting;
     }
-    if (run == RUN_ARRAY && array[at] == 0) { /* also where it has been edited meanwhile */
-        at = 0;
-        if (array[0] == 0) {
-            end_loop();
+    if (run != RUN_NOTHING && !is_over()) {
+        if (run == RUN_ARRAY) {
+            return array[ends_pass() ? 0 : at];
         }
-    }
-    if (run != RUN_NOTHING) {
-        return run == RUN_LOOP ? at : array[at];
+        return at == 0 || ends_pass() ? bounds[QUEUE_LOOP_START] : after(at);
     }
     if (pending == 0) {
         return NONE;
     }
     uint8_t position = (uint8_t)(next_available - pending);
     return position < QUEUE_FIRST || position > QUEUE_LAST ? (uint8_t)(position + QUEUE_LAST) : position;
-}
-
-static void end_pass(uint8_t first)
-{
-    at = first;
-    if (passes != 0 && --passes == 0) {
-        end_loop();
-    }
 }
 
 /* What was chosen has begun. */
@@ -92,20 +93,21 @@ static NOINLINE void advance(void)
     due = END_NOT;
     if (preempting != NONE) {
         preempting = NONE;
-    } else if (last_of_loop) {
-        end_loop();
-    } else if (run == RUN_LOOP) {
-        if (at == bounds[QUEUE_LOOP_FINISH]) {
-            end_pass(bounds[QUEUE_LOOP_START]);
-        } else {
-            at = after(at);
+    } else if (run != RUN_NOTHING && !is_over()) {
+        if (ends_pass()) {
+            if (passes != 0) {
+                passes--;
+            }
+            at = 0;
         }
-    } else if (run == RUN_ARRAY) {
-        at++;
-        if (at == QUEUE_ARRAY || array[at] == 0) {
-            end_pass(0);
+        at = run == RUN_LOOP ? executing : (uint8_t)(at + 1);
+        if (last_of_loop) {
+            end_loop();
         }
     } else {
+        if (run != RUN_NOTHING) {
+            end_loop();
+        }
         pending--;
     }
 }
@@ -134,6 +136,9 @@ bool queue_poll(void)
     const bool changed = note_begun();
     if (due != END_NOT && engine_next(due == END_GRACEFULLY)) {
         due = END_NOT;
+    }
+    if (run != RUN_NOTHING && is_over() && !queue_is_executing()) {
+        end_loop();
     }
     return offer() || changed;
 }
@@ -209,7 +214,6 @@ static void write(uint8_t position, const motion_command_t *command, bool added)
 
 status_t queue_add(const motion_command_t *command)
 {
-    (void)note_begun();
     if (estop_port_active()) {
         return STATUS_ESTOP;
     }
@@ -230,7 +234,6 @@ void queue_edit(uint8_t position, const motion_command_t *command)
 
 status_t queue_undo(void)
 {
-    (void)note_begun();
     const uint8_t position = undo_position;
     if (position == 0 || position == queue_executing_position()) {
         return STATUS_NOTHING_TO_UNDO;
@@ -256,7 +259,6 @@ status_t queue_preempt(uint8_t position)
 
 status_t queue_preempt_with(uint8_t position, const motion_command_t *command)
 {
-    (void)note_begun();
     if (estop_port_active()) {
         return STATUS_ESTOP;
     }
@@ -269,7 +271,6 @@ status_t queue_preempt_with(uint8_t position, const motion_command_t *command)
 
 static bool is_continuous(void)
 {
-    (void)note_begun();
     return executing == QUEUE_CONTINUOUS && queue_is_executing();
 }
 
@@ -308,15 +309,14 @@ void queue_throttle(int8_t rpm)
 
 /* -- loops ------------------------------------------------------------------------------------------------------- */
 
-static status_t begin_run(run_t what, uint8_t first)
+static status_t begin_run(run_t what)
 {
-    (void)note_begun();
     if (estop_port_active()) {
         end_loop();
         return STATUS_ESTOP;
     }
     run = what;
-    at = first;
+    at = 0;
     last_of_loop = false;
     (void)offer();
     return STATUS_OK;
@@ -329,7 +329,7 @@ NOINLINE status_t queue_loop_bound(queue_bound_t bound, uint8_t position)
     }
     bounds[bound] = position;
     if (bounds[1 - bound] != 0 && run != RUN_LOOP) {
-        return begin_run(RUN_LOOP, bounds[QUEUE_LOOP_START]);
+        return begin_run(RUN_LOOP);
     }
     return STATUS_OK;
 }
@@ -338,7 +338,7 @@ NOINLINE status_t queue_loop_from_first(uint8_t finish)
 {
     bounds[QUEUE_LOOP_START] = QUEUE_FIRST;
     bounds[QUEUE_LOOP_FINISH] = finish;
-    return begin_run(RUN_LOOP, QUEUE_FIRST);
+    return begin_run(RUN_LOOP);
 }
 
 void queue_loop_passes(uint16_t count)
@@ -348,7 +348,6 @@ void queue_loop_passes(uint16_t count)
 
 void queue_array_set(uint8_t entry, uint8_t position)
 {
-    (void)note_begun();
     array[entry] = position;
     (void)offer();
 }
@@ -365,7 +364,7 @@ NOINLINE status_t queue_array_run(uint16_t count)
     }
     end_loop();
     passes = count;
-    return begin_run(RUN_ARRAY, 0);
+    return begin_run(RUN_ARRAY);
 }
 
 void queue_loop_end(void)
@@ -390,14 +389,12 @@ static void forget(void)
 
 NOINLINE void queue_stop(void)
 {
-    (void)note_begun();
     forget();
     engine_stop();
 }
 
 void queue_stop_graceful(accel_code_t decel, bool linear)
 {
-    (void)note_begun();
     forget();
     engine_stop_graceful(decel, linear);
 }
@@ -406,7 +403,6 @@ void queue_stop_graceful(accel_code_t decel, bool linear)
  * continuous motion is, it shall end too; and a loop that it has interrupted executes one more command. */
 static void end_running(end_t how)
 {
-    (void)note_begun();
     if (!engine_next(how == END_GRACEFULLY) && is_continuous()) {
         due = how;
     }

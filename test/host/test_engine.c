@@ -632,6 +632,19 @@ static void test_the_start_wait_counts_from_the_start_in_microseconds(void)
     }
 }
 
+/* Of a wait that fits one period the pulse is in the ring one step earlier than of others. */
+static void test_no_pulse_is_lost_behind_a_start_wait_of_any_length(void)
+{
+    for (uint32_t us = 2900; us < 9000; us += 100) {
+        setUp();
+        motion_command_t c = cycle_move(4, 1800, 999, 999);
+        c.start_wait_us = us;
+        submit(c);
+        run_to_end();
+        assert_ended_at(4);
+    }
+}
+
 /* SWT-001, SWT-006 */
 static void test_the_start_wait_counts_from_the_end_of_the_command_before(void)
 {
@@ -816,6 +829,38 @@ static void test_graceful_next_without_deceleration_leaves_the_velocity_in_play(
     uint64_t last = step_player_edges() - 1;
     for (uint64_t k = 90; k < last - 90; k++)
         TEST_ASSERT_UINT64_WITHIN(10, 3000 * US, step_player_interval(k)); /* speed in hundredths of an RPM */
+}
+
+/* NXT-001, SYN-001: also where it is so short that what follows would be joined to it. */
+static void test_nothing_is_begun_before_a_held_command_has_been_released(void)
+{
+    motion_command_t held = cycle_move(3, 1400, 999, 999);
+    held.flags |= MOTION_SYNC;
+    submit(held);
+    const motion_command_t next = move(-100, 100, 1, 1);
+    engine_offer(&next);
+    run_for(1000000);
+    TEST_ASSERT_TRUE(can_offer());
+    TEST_ASSERT_TRUE(engine_next(true));
+    engine_offer(&next); /* as the queue does it all the time */
+    run_to_end();
+    assert_ended_at(-100);
+}
+
+/* What is in the ring has not been played because the timer has nothing to do. */
+static void test_a_command_has_not_ended_where_the_planner_was_late(void)
+{
+    settings.slow_rpm = 200;
+    engine_init();
+    submit(move(7, 250, 50, 50));
+    step_player_advance(16000000);
+    TEST_ASSERT_TRUE(step_idle);
+    while (step_idle)
+        engine_poll();
+    TEST_ASSERT_EQUAL_UINT8(0, ended());
+    run_to_end();
+    assert_ended_at(7);
+    TEST_ASSERT_EQUAL_UINT8(1, ended());
 }
 
 /* NXT-003 */
@@ -1101,6 +1146,7 @@ int main(void)
     RUN_TEST(test_one_step_of_deceleration_returns_to_slow_speed);
     RUN_TEST(test_a_start_wait_longer_than_the_gap_is_a_start_from_slow_speed);
     RUN_TEST(test_the_start_wait_counts_from_the_start_in_microseconds);
+    RUN_TEST(test_no_pulse_is_lost_behind_a_start_wait_of_any_length);
     RUN_TEST(test_the_start_wait_counts_from_the_end_of_the_command_before);
     RUN_TEST(test_a_stop_ends_a_wait_and_a_long_interval_at_once);
     RUN_TEST(test_a_stop_is_followed_by_no_edge_and_loses_none);
@@ -1110,6 +1156,7 @@ int main(void)
     RUN_TEST(test_next_ends_the_command_and_goes_on_with_the_queued_one);
     RUN_TEST(test_graceful_next_goes_on_with_the_queued_command);
     RUN_TEST(test_graceful_next_without_deceleration_leaves_the_velocity_in_play);
+    RUN_TEST(test_nothing_is_begun_before_a_held_command_has_been_released);
     RUN_TEST(test_next_with_nothing_queued_ends_in_standby);
     RUN_TEST(test_single_pulses_are_stacked_in_both_directions);
     RUN_TEST(test_a_single_pulse_is_one_edge_whatever_the_microsteps);
@@ -1124,5 +1171,6 @@ int main(void)
     RUN_TEST(test_a_steep_linear_ramp_from_standstill_speeds_up_and_slows_down);
     RUN_TEST(test_no_motion_so_far_has_starved);
     RUN_TEST(test_a_planner_that_is_too_slow_neither_adds_nor_loses_a_pulse);
+    RUN_TEST(test_a_command_has_not_ended_where_the_planner_was_late);
     return UNITY_END();
 }

@@ -306,6 +306,8 @@ static void test_a_loop_makes_so_many_passes_and_forgets_its_bounds(void)
     queue_loop_bound(QUEUE_LOOP_START, 1);
     queue_loop_bound(QUEUE_LOOP_FINISH, 3);
     expect_order("1 2 3 1 2 3 0");
+    engine_fake.ended = engine_fake.begun;
+    queue_poll();
     queue_loop_bound(QUEUE_LOOP_FINISH, 3);
     TEST_ASSERT_EQUAL_UINT32(0, begin_next());
     queue_loop_bound(QUEUE_LOOP_START, 2);
@@ -351,6 +353,21 @@ static void test_bounds_can_be_changed_while_the_loop_runs(void)
     expect_order("3 4 5 1 2");
     queue_loop_bound(QUEUE_LOOP_START, 4);
     expect_order("3 4 5 4 5");
+}
+
+/* LOO-014: what counts are the bounds when a command is done, not when it begins. */
+static void test_bounds_can_be_changed_while_the_last_command_of_a_pass_runs(void)
+{
+    number_the_entries();
+    queue_loop_passes(2);
+    queue_loop_from_first(3);
+    expect_order("1 2 3");
+    queue_loop_bound(QUEUE_LOOP_FINISH, 4);
+    expect_order("4 1 2");
+    queue_loop_bound(QUEUE_LOOP_FINISH, 2);
+    expect_order("0");
+    queue_loop_bound(QUEUE_LOOP_FINISH, 3);
+    expect_order("3 0");
 }
 
 /* What was typed while a loop runs comes after it. */
@@ -633,6 +650,7 @@ int main(void)
     RUN_TEST(test_autorun_of_one_repeats_the_first_entry);
     RUN_TEST(test_a_loop_ends_with_the_running_command);
     RUN_TEST(test_bounds_can_be_changed_while_the_loop_runs);
+    RUN_TEST(test_bounds_can_be_changed_while_the_last_command_of_a_pass_runs);
     RUN_TEST(test_commands_that_are_pending_follow_the_loop);
     RUN_TEST(test_xref_preempts_and_the_loop_goes_on_with_its_next_command);
     RUN_TEST(test_a_running_command_that_cannot_be_cut_now_is_cut_later);

@@ -103,7 +103,7 @@ typedef struct {
     current_t now;
     uint64_t ready_min, ready_max; /* when what comes next may begin */
     uint64_t moving_until;         /* a command that is over may still count as motion */
-    uint64_t completed;            /* when a command made its last pulse */
+    uint64_t completed;            /* when a command made its last pulse, or was cut */
     uint32_t passes, passes_made;  /* LS, LF */
     uint32_t array_passes, array_passes_made;
     uint32_t inputs; /* that have taken effect */
@@ -339,6 +339,8 @@ static void end_current(const processor_t *p, world_t *w)
         end = p->last_rise;
     if (!now->ending)
         w->ready_min = p->last_rise;
+    else
+        w->completed = p->last_rise;
     w->ready_max = later(w->ready_max, end);
     w->moving_until = now->single ? 0 : end + 2 * longest_ticks(p, now) + MS;
     drop_current(p, w);
@@ -651,6 +653,11 @@ static void close_set(processor_t *p, uint64_t cycle)
                 applied.inputs++;
                 apply(p, &applied, in, (early ? in->cycle : p->last_rise) + in->takes + TAIL);
                 add(p, &applied);
+                if ((in->kind == NEXT_NOW || in->kind == NEXT_RAMP) && between && w.now.present && !w.now.continuous) {
+                    applied = w; /* it was for the one before, which ended soon */
+                    applied.inputs++;
+                    add(p, &applied);
+                }
                 if (in->kind == SINGLE && !w.now.present && in->cycle <= w.moving_until) {
                     applied = w; /* ignored */
                     applied.inputs++;
@@ -1046,6 +1053,8 @@ static bool is(const processor_t *p, const world_t *w, processor_condition_t con
         return w->now.present && w->now.held;
     case PROCESSOR_LOOPS:
         return in_loop(w);
+    case PROCESSOR_ARRAY:
+        return w->array_looping;
     case PROCESSOR_CONTINUOUS:
         return w->preempting == 1 || (w->now.present && w->now.continuous);
     case PROCESSOR_ENDING:

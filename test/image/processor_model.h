@@ -60,6 +60,7 @@ typedef enum {
     PROCESSOR_ENDS_SOON,  /* within 30 ms, and the next one follows */
     PROCESSOR_HELD,       /* a command waits for sync */
     PROCESSOR_LOOPS,      /* a loop or the xRef array is run, or interrupted */
+    PROCESSOR_ARRAY,      /* the latter */
     PROCESSOR_CONTINUOUS, /* runs or is about to */
     PROCESSOR_ENDING,     /* a command is being cut or ramps down */
     PROCESSOR_HALF_LOOP,  /* one bound is set */

@@ -464,6 +464,11 @@ void step_port_release(void)
     }
 }
 
+bool step_port_held(void)
+{
+    return p.ready;
+}
+
 void step_port_start(void)
 {
     step_port_hold();
