@@ -158,11 +158,20 @@ static status_t command_run_array(const char *rest)
     return queue_array_run(0);
 }
 
+/* Unless the display is refused. */
+static NOINLINE status_t enter(uint8_t new_mode, display_t display)
+{
+    const status_t status = display_request(display);
+    if (status == STATUS_OK) {
+        mode = new_mode;
+    }
+    return status;
+}
+
 static status_t command_program_array(const char *rest)
 {
     (void)rest;
-    mode = MODE_ARRAY;
-    return display_request(DISPLAY_ARRAY);
+    return enter(MODE_ARRAY, DISPLAY_ARRAY);
 }
 
 /* In that mode: <entry>,<position>. */
@@ -177,8 +186,10 @@ static NOINLINE status_t program_array(const char *line)
         status = read_only_number(behind_number + 1, &array_entries);
     }
     if (status == STATUS_OK) {
-        queue_array_set(entry, number_8());
-        status = display_request(DISPLAY_ARRAY);
+        status = queue_array_set(entry, number_8());
+    }
+    if (status == STATUS_OK) {
+        (void)display_request(DISPLAY_ARRAY); /* it is set, even if there is no room for one more display */
     }
     return status;
 }
@@ -261,8 +272,7 @@ static status_t command_configure(const char *rest)
     if (more(*rest)) {
         return configure_set(rest);
     }
-    mode = MODE_CONFIGURE;
-    return display_request(DISPLAY_CONFIGURE);
+    return enter(MODE_CONFIGURE, DISPLAY_CONFIGURE);
 }
 
 static status_t command_save(const char *rest)

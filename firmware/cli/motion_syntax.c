@@ -139,10 +139,12 @@ static NOINLINE void close_parameter(motion_syntax_t *syntax)
         command->count = value;
         flag = MOTION_CCW;
         on = has(syntax, HAS_DIGIT | HAS_MINUS) ? number & HAS_MINUS : settings.direction;
-        if ((syntax->given & (EDITS | GIVEN_UNIT)) == EDITS) {
-            command->flags &= (uint8_t)~MOTION_PULSES;
+        if (syntax->given & EDITS) {
             if (value == 0) {
                 refuse(syntax, STATUS_NUMBER_MISSING);
+            }
+            if (!(syntax->given & GIVEN_UNIT)) {
+                command->flags &= (uint8_t)~MOTION_PULSES;
             }
         }
         break;

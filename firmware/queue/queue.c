@@ -254,7 +254,8 @@ status_t queue_undo(void)
 
 status_t queue_preempt(uint8_t position)
 {
-    return queue_preempt_with(position, &entries[position]);
+    const status_t status = engine_check(&entries[position]);
+    return status == STATUS_OK ? queue_preempt_with(position, &entries[position]) : status;
 }
 
 status_t queue_preempt_with(uint8_t position, const motion_command_t *command)
@@ -309,36 +310,59 @@ void queue_throttle(int8_t rpm)
 
 /* -- loops ------------------------------------------------------------------------------------------------------- */
 
-static status_t begin_run(run_t what)
+/* Entries may be older than the settings in force, and impossible with them. */
+static NOINLINE status_t may_run(uint8_t first, uint8_t last)
 {
+    status_t status = STATUS_OK;
     if (estop_port_active()) {
-        end_loop();
         return STATUS_ESTOP;
     }
+    do {
+        status = engine_check(&entries[first]);
+        if (first == last) {
+            break;
+        }
+        first = after(first);
+    } while (status == STATUS_OK);
+    return status;
+}
+
+static void begin_run(run_t what)
+{
     run = what;
     at = 0;
     last_of_loop = false;
     (void)offer();
-    return STATUS_OK;
 }
 
 NOINLINE status_t queue_loop_bound(queue_bound_t bound, uint8_t position)
 {
-    if (position == bounds[1 - bound]) {
+    const uint8_t other = bounds[1 - bound];
+    if (position == other) {
         return STATUS_LOOP_BOUNDS;
     }
+    if (other != 0) {
+        const status_t status = bound == QUEUE_LOOP_START ? may_run(position, other) : may_run(other, position);
+        if (status != STATUS_OK) {
+            return status;
+        }
+    }
     bounds[bound] = position;
-    if (bounds[1 - bound] != 0 && run != RUN_LOOP) {
-        return begin_run(RUN_LOOP);
+    if (other != 0 && run != RUN_LOOP) {
+        begin_run(RUN_LOOP);
     }
     return STATUS_OK;
 }
 
 NOINLINE status_t queue_loop_from_first(uint8_t finish)
 {
-    bounds[QUEUE_LOOP_START] = QUEUE_FIRST;
-    bounds[QUEUE_LOOP_FINISH] = finish;
-    return begin_run(RUN_LOOP);
+    const status_t status = may_run(QUEUE_FIRST, finish);
+    if (status == STATUS_OK) {
+        bounds[QUEUE_LOOP_START] = QUEUE_FIRST;
+        bounds[QUEUE_LOOP_FINISH] = finish;
+        begin_run(RUN_LOOP);
+    }
+    return status;
 }
 
 void queue_loop_passes(uint16_t count)
@@ -346,10 +370,17 @@ void queue_loop_passes(uint16_t count)
     passes = count;
 }
 
-void queue_array_set(uint8_t entry, uint8_t position)
+status_t queue_array_set(uint8_t entry, uint8_t position)
 {
+    if (run == RUN_ARRAY && position != 0) {
+        const status_t status = may_run(position, position);
+        if (status != STATUS_OK) {
+            return status;
+        }
+    }
     array[entry] = position;
     (void)offer();
+    return STATUS_OK;
 }
 
 uint8_t queue_array(uint8_t entry)
@@ -362,9 +393,16 @@ NOINLINE status_t queue_array_run(uint16_t count)
     if (array[0] == 0) {
         return STATUS_ARRAY_EMPTY;
     }
+    for (uint8_t entry = 0; entry < QUEUE_ARRAY && array[entry] != 0; entry++) {
+        const status_t status = may_run(array[entry], array[entry]);
+        if (status != STATUS_OK) {
+            return status;
+        }
+    }
     end_loop();
     passes = count;
-    return begin_run(RUN_ARRAY);
+    begin_run(RUN_ARRAY);
+    return STATUS_OK;
 }
 
 void queue_loop_end(void)

@@ -5,7 +5,8 @@
  * in this order: the command that preempts, the next one of the loop or of the xRef array, the oldest pending one. It is
  * offered to the engine, which takes its values when it plans it: until then edits reach it.
  * Context: main loop.
- * Errors:  a status; nothing is changed then. While Estop is active what would begin motion is refused (STATUS_ESTOP).
+ * Errors:  a status; nothing is changed then. What would begin motion is refused while Estop is active (STATUS_ESTOP), and
+ *          where an entry, older than the settings in force, is impossible with them (as engine_check() says).
  * Tests:   test/host/test_queue.c, test/image/test_image_processor.c
  * Source:  manual lines 271, 302-371, 485, 553-610, 959; decisions, sections 4 and 5. */
 #ifndef QUEUE_QUEUE_H
@@ -65,7 +66,7 @@ status_t queue_loop_from_first(uint8_t finish);
 void queue_loop_passes(uint16_t passes); /* of the loop or array that runs or begins next; 0: endless */
 
 /* The xRef array: entry 0..30, position 1..30 or 0 for its end. queue_array_run(): STATUS_ARRAY_EMPTY. */
-void queue_array_set(uint8_t entry, uint8_t position);
+status_t queue_array_set(uint8_t entry, uint8_t position);
 uint8_t queue_array(uint8_t entry);
 status_t queue_array_run(uint16_t passes);
 

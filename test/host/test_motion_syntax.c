@@ -470,7 +470,7 @@ static void test_a_refused_edit_changes_nothing(void)
     static const struct {
         const char *text;
         status_t status;
-    } refused[] = {{"m", STATUS_NUMBER_MISSING}, {"m0", STATUS_NUMBER_MISSING}, {"m5k", STATUS_SYNTAX},
+    } refused[] = {{"m", STATUS_NUMBER_MISSING}, {"m0", STATUS_NUMBER_MISSING}, {"pm0", STATUS_NUMBER_MISSING}, {"m5k", STATUS_SYNTAX},
                    {"5", STATUS_SYNTAX},         {"v0", STATUS_VELOCITY_ZERO},  {"u256", STATUS_RANGE},
                    {"vc1", STATUS_PERIOD_TOO_SHORT}};
     for (size_t i = 0; i < sizeof refused / sizeof refused[0]; i++) {

@@ -625,6 +625,43 @@ static void test_while_estop_is_active_nothing_begins(void)
     TEST_ASSERT_EQUAL(0, engine_fake.submitted_count);
 }
 
+/* EST: what is refused while Estop is low leaves everything as it was. */
+static void test_estop_refuses_loops_and_forgets_nothing(void)
+{
+    number_the_entries();
+    queue_loop_passes(1);
+    TEST_ASSERT_EQUAL(STATUS_OK, queue_loop_bound(QUEUE_LOOP_START, 3));
+    engine_fake.estop = true;
+    TEST_ASSERT_EQUAL(STATUS_ESTOP, queue_loop_bound(QUEUE_LOOP_FINISH, 4));
+    TEST_ASSERT_EQUAL(STATUS_ESTOP, queue_loop_from_first(30));
+    TEST_ASSERT_EQUAL(STATUS_ESTOP, queue_preempt(5));
+    TEST_ASSERT_EQUAL_UINT32(0, begin_next());
+    engine_fake.estop = false;
+    TEST_ASSERT_EQUAL(STATUS_OK, queue_loop_bound(QUEUE_LOOP_FINISH, 4));
+    expect_order("3 4 0");
+}
+
+/* Entries that were possible before a warm boot need not be so after it. */
+static void test_entries_that_have_become_impossible_are_not_executed(void)
+{
+    number_the_entries();
+    motion_command_t fast = command_of(7);
+    fast.velocity = 60000; /* 5 us a step */
+    queue_edit(7, &fast);
+    queue_array_set(0, 1);
+    queue_array_set(1, 7);
+    settings.ustep = 4;
+    TEST_ASSERT_EQUAL(STATUS_PERIOD_TOO_SHORT, queue_preempt(7));
+    TEST_ASSERT_EQUAL(STATUS_PERIOD_TOO_SHORT, queue_loop_from_first(30));
+    TEST_ASSERT_EQUAL(STATUS_PERIOD_TOO_SHORT, queue_array_run(1));
+    TEST_ASSERT_EQUAL(STATUS_OK, queue_loop_bound(QUEUE_LOOP_START, 29));
+    TEST_ASSERT_EQUAL(STATUS_PERIOD_TOO_SHORT, queue_loop_bound(QUEUE_LOOP_FINISH, 7));
+    TEST_ASSERT_EQUAL_UINT32(0, begin_next());
+    TEST_ASSERT_EQUAL(STATUS_OK, queue_loop_bound(QUEUE_LOOP_FINISH, 2));
+    TEST_ASSERT_EQUAL(STATUS_PERIOD_TOO_SHORT, queue_loop_bound(QUEUE_LOOP_FINISH, 8));
+    expect_order("29 30 1 2 29");
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -669,5 +706,7 @@ int main(void)
     RUN_TEST(test_undo_takes_back_one_command_or_edit);
     RUN_TEST(test_what_is_executing_is_not_taken_back);
     RUN_TEST(test_while_estop_is_active_nothing_begins);
+    RUN_TEST(test_estop_refuses_loops_and_forgets_nothing);
+    RUN_TEST(test_entries_that_have_become_impossible_are_not_executed);
     return UNITY_END();
 }
