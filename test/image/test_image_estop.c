@@ -363,7 +363,7 @@ static void spread(const char *name, const char *line, bool receiving, uint64_t 
     printf("sync to first pulse, %s: %llu to %llu cycles\n", name, (unsigned long long)least, (unsigned long long)most);
     if (most - least > US)
         image_fail("%s: expected a spread of 16 cycles at most, saw %llu", name, (unsigned long long)(most - least));
-    image_assert_near("the shortest", 120 + (double)wait, (double)least, 10);
+    image_assert_near("the shortest", 115 + (double)wait, (double)least, 10);
 }
 
 /* SYN-004, SYN-010, PIN-008 */
