@@ -985,6 +985,7 @@ void processor_sync_edge(processor_t *p, uint64_t cycle)
     in.kind = RELEASE;
     in.cycle = cycle;
     in.takes = TAKES;
+    in.joins = JOINS;
     put_in(p, &in);
 }
 

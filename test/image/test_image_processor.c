@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define SCRIPTS 1000
+#define SCRIPTS 500
 #define LEAST_LINES 4
 #define MOST_LINES 22
 #define QUIET (12 * MS) /* when a command that ends or begins has surely done so */
