@@ -110,7 +110,7 @@ typedef struct {
     uint8_t array[ARRAY + 1];
     uint8_t next, pending;
     uint8_t start, finish, looping, executing;   /* executing 0: not begun */
-    uint8_t array_looping, array_index, last;    /* index 0: not begun, otherwise one more; last 1: one more, 2: that one */
+    uint8_t array_looping, array_index, last;    /* index 0: not begun, otherwise one more; last: one more command */
     uint8_t preempting;                          /* 0 none, 1 continuous, 2 position, 3 throw-away */
     uint8_t preempting_position, estop, unused[4];
 } world_t;
@@ -267,10 +267,6 @@ static bool in_loop(const world_t *w)
 /* The position that the loop executes next; 0: it is over. */
 static unsigned next_of_loop(world_t *w)
 {
-    if (w->last == 2)
-        return 0;
-    if (w->last == 1)
-        w->last = 2;
     if (w->looping) {
         if (w->executing == 0) {
             w->executing = w->start;
@@ -301,9 +297,12 @@ static bool take_up(const processor_t *p, world_t *w)
         return true;
     }
     if (in_loop(w)) {
+        bool last = w->last;
         unsigned position = next_of_loop(w);
         if (position) {
             begin(p, w, &w->entry[position]);
+            if (last)
+                forget_loop(w);
             return true;
         }
         forget_loop(w);
@@ -651,7 +650,8 @@ static void close_set(processor_t *p, uint64_t cycle)
             if (early || between) {
                 world_t applied = w;
                 applied.inputs++;
-                apply(p, &applied, in, (early ? in->cycle : p->last_rise) + in->takes + TAIL);
+                if (early || in->kind != RELEASE) /* (that is not late, but it may stand behind a line that is) */
+                    apply(p, &applied, in, (early ? in->cycle : p->last_rise) + in->takes + TAIL);
                 add(p, &applied);
                 if ((in->kind == NEXT_NOW || in->kind == NEXT_RAMP) && between && w.now.present && !w.now.continuous) {
                     applied = w; /* it was for the one before, which ended soon */
@@ -970,7 +970,7 @@ bool processor_line(processor_t *p, uint64_t cycle, const char *line)
     in.joins = JOINS;
     if (!parse(p, line, &in))
         return false;
-    if (in.kind == STOP_NOW || in.kind == RELEASE)
+    if (in.kind == STOP_NOW)
         in.joins = 0;
     if (in.kind == STOP_NOW)
         in.takes = STOPS;
@@ -985,6 +985,7 @@ void processor_sync_edge(processor_t *p, uint64_t cycle)
     in.kind = RELEASE;
     in.cycle = cycle;
     in.takes = TAKES;
+    in.joins = JOINS;
     put_in(p, &in);
 }
 

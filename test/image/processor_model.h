@@ -17,7 +17,7 @@
  *   8. X on X: the first one is cut. After it the loop or the queue goes on as if the first had ended.
  *   9. X and N cut at once whatever direction follows; m that turns round may ramp down first (A-DIR-02).
  *  10. N or n on a continuous command that interrupted a loop: one more command of the loop, or of the xRef array, then
- *      the loop is forgotten and what is pending follows.
+ *      the loop is forgotten (bounds typed from then on are a new one) and what is pending follows.
  *  11. m on m: the second replaces the first; what the first has interrupted is still interrupted.
  *  12. n and L never make more pulses than the command has. s ramps down with the session's decel and law, and may make
  *      more where it is flatter than what is left.
