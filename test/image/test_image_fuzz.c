@@ -116,7 +116,7 @@ static look_t look(void)
     for (unsigned i = 0; i < QUEUE_ARRAY; i++)
         all.array[i] = board_peek8(board, (uint16_t)(array + i));
     all.mode = image_peek("mode");
-    all.idle = image_peek("jobs") == 0;
+    all.idle = image_peek("the_store") == 0; /* its jobs, which stand first */
     if (all.idle)
         memcpy(all.eeprom, board_eeprom(board), sizeof all.eeprom);
     all.next = image_peek("next_available");
