@@ -299,9 +299,8 @@ void queue_throttle(int8_t rpm)
         return;
     }
     motion_command_t faster = entries[QUEUE_CONTINUOUS];
-    const uint32_t least = rpm < 0 ? 1u + (uint8_t)-rpm : 0;
-    const uint32_t before = command_rpm(&faster);
-    faster.velocity = before < least ? 1u : (uint32_t)((int32_t)before + rpm);
+    const int32_t wanted = (int32_t)command_rpm(&faster) + rpm;
+    faster.velocity = wanted < 1 ? 1u : (uint32_t)wanted;
     faster.flags &= (uint8_t)~MOTION_CYCLE;
     if (engine_check(&faster) == STATUS_OK) {
         (void)queue_preempt_with(QUEUE_CONTINUOUS, &faster);
@@ -372,8 +371,8 @@ void queue_loop_passes(uint16_t count)
 
 status_t queue_array_set(uint8_t entry, uint8_t position)
 {
-    if (run == RUN_ARRAY && position != 0) {
-        const status_t status = may_run(position, position);
+    if (position != 0) {
+        const status_t status = engine_check(&entries[position]);
         if (status != STATUS_OK) {
             return status;
         }
