@@ -318,6 +318,7 @@ status_t queue_loop_bound(queue_bound_t bound, uint8_t position)
     if (bounds[1 - bound] != 0 && run != RUN_LOOP) {
         return begin_run(RUN_LOOP);
     }
+    (void)offer();
     return STATUS_OK;
 }
 
@@ -331,6 +332,7 @@ status_t queue_loop_from_first(uint8_t finish)
 void queue_loop_passes(uint16_t count)
 {
     passes = count;
+    (void)offer();
 }
 
 void queue_array_set(uint8_t entry, uint8_t position)
