@@ -350,6 +350,7 @@ NOINLINE status_t queue_loop_bound(queue_bound_t bound, uint8_t position)
     if (other != 0 && run != RUN_LOOP) {
         begin_run(RUN_LOOP);
     }
+    (void)offer();
     return STATUS_OK;
 }
 
@@ -367,6 +368,7 @@ NOINLINE status_t queue_loop_from_first(uint8_t finish)
 void queue_loop_passes(uint16_t count)
 {
     passes = count;
+    (void)offer();
 }
 
 status_t queue_array_set(uint8_t entry, uint8_t position)

@@ -370,6 +370,22 @@ static void test_bounds_can_be_changed_while_the_last_command_of_a_pass_runs(voi
     expect_order("3 0");
 }
 
+/* LOO-014: the engine may begin at any moment what it was offered. */
+static void test_a_changed_bound_changes_at_once_what_is_offered(void)
+{
+    number_the_entries();
+    queue_loop_passes(1);
+    queue_loop_from_first(3);
+    expect_order("1 2 3");
+    engine_fake.accepts = false;
+    add(100);
+    queue_loop_bound(QUEUE_LOOP_FINISH, 5);
+    TEST_ASSERT_EQUAL_PTR(queue_entry(4), engine_fake.offered);
+    queue_loop_passes(0);
+    queue_loop_bound(QUEUE_LOOP_FINISH, 3);
+    TEST_ASSERT_EQUAL_PTR(queue_entry(1), engine_fake.offered);
+}
+
 /* What was typed while a loop runs comes after it. */
 static void test_commands_that_are_pending_follow_the_loop(void)
 {
@@ -688,6 +704,7 @@ int main(void)
     RUN_TEST(test_a_loop_ends_with_the_running_command);
     RUN_TEST(test_bounds_can_be_changed_while_the_loop_runs);
     RUN_TEST(test_bounds_can_be_changed_while_the_last_command_of_a_pass_runs);
+    RUN_TEST(test_a_changed_bound_changes_at_once_what_is_offered);
     RUN_TEST(test_commands_that_are_pending_follow_the_loop);
     RUN_TEST(test_xref_preempts_and_the_loop_goes_on_with_its_next_command);
     RUN_TEST(test_a_running_command_that_cannot_be_cut_now_is_cut_later);
