@@ -243,6 +243,9 @@ static status_t command_program_queue(const char *rest)
 static status_t command_clear_queue(const char *rest)
 {
     (void)rest;
+    if (store_busy()) {
+        return STATUS_BUSY; /* it may be the queue that is being saved */
+    }
     queue_clear();
     return STATUS_OK;
 }

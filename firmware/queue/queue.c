@@ -1,12 +1,12 @@
 #include "queue/queue.h"
 #include "base/inline.h"
+#include "base/zeroed.h"
 #include "eeprom/store.h"
 #include "motion/engine.h"
 #include "motion/estop_port.h"
 #include "queue/encoder.h"
 #include "queue/session.h"
 #include "settings.h"
-#include <string.h>
 
 enum { NONE = 0xFF }; /* no position */
 
@@ -145,17 +145,14 @@ bool queue_poll(void)
 
 void queue_init(void)
 {
-    revolution(&entries[0]);
-    uint8_t *bytes = (uint8_t *)entries;
-    for (uint16_t i = 0; i < sizeof entries - sizeof entries[0]; i++) {
-        bytes[i + sizeof entries[0]] = bytes[i]; /* each entry from the one before it */
-    }
-    memset(array, 0, sizeof array);
+    queue_clear();
+    revolution(&entries[QUEUE_CONTINUOUS]);
+    revolution(&entries[QUEUE_ONE_SHOT]);
+    AT_BOOT_ZERO(array);
     next_available = QUEUE_FIRST;
-    pending = 0;
+    AT_BOOT_ZERO(pending);
     preempting = NONE;
-    due = END_NOT;
-    undo_position = 0;
+    AT_BOOT_ZERO(due);
     begun = engine_commands_begun();
     end_loop();
 }
@@ -179,7 +176,7 @@ status_t queue_restore(bool *saved)
 {
     *saved = false;
     if (store_busy()) {
-        return STATUS_WAIT;
+        return STATUS_BUSY;
     }
     const store_queue_t found = store_load_queue(&entries[QUEUE_FIRST]);
     if (found == STORE_QUEUE_BROKEN) {

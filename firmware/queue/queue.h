@@ -33,7 +33,7 @@ void queue_init(void);
 void queue_clear(void);
 
 /* Saves the entries 1..30 in the background (eeprom/store.h), and gets them back: the last snapshot, or system defaults
- * if none was ever saved. STATUS_WAIT: something is being written; STATUS_SNAPSHOT: it is damaged, nothing is changed. */
+ * if none was ever saved. STATUS_BUSY: something is being written; STATUS_SNAPSHOT: it is damaged, nothing is changed. */
 void queue_save(void);
 status_t queue_restore(bool *saved); /* whether there was a snapshot */
 

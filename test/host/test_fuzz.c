@@ -93,29 +93,6 @@ void setUp(void) {}
 
 void tearDown(void) {}
 
-/* -- faults of the firmware that are known and not repaired yet: each is told at the end of the run -------------------- */
-
-#define KNOWN_FAULTS                                                                                         \
-    KNOWN(NONE, "")                                                                                          \
-    KNOWN(COUNT_0, "q5pm0, q5fm: an edit with f or p before m takes a count of 0, or none, into the queue")  \
-    KNOWN(RESTART, "m200vc10a999d999, $CJ4, $R: the queue keeps what the new settings make impossible")      \
-    KNOWN(BUSY, "a flood with xp, $C or 1,7 in the array's mode: ?11 busy, but it is done (may have been)")
-
-typedef enum {
-#define KNOWN(name, words) KNOWN_##name,
-    KNOWN_FAULTS
-#undef KNOWN
-} known_t;
-
-static const char *const known_words[] = {
-#define KNOWN(name, words) words,
-    KNOWN_FAULTS
-#undef KNOWN
-};
-enum { KNOWN_COUNT = sizeof known_words / sizeof known_words[0] };
-static uint64_t known_seen[KNOWN_COUNT];
-static uint64_t floods; /* in which such a line may have been */
-
 /* -- the ranges: one place for all of them ----------------------------------------------------------------------------- */
 
 static bool is_ramp(accel_code_t code)
@@ -138,8 +115,7 @@ static bool is_possible(uint32_t velocity, uint8_t flags)
     if (velocity == 0 || is_possible_now(velocity, flags)) {
         return velocity > 0;
     }
-    known_seen[KNOWN_RESTART] += settings_changed;
-    return settings_changed;
+    return settings_changed; /* x, loops and the array refuse it then */
 }
 
 static void check_ranges(void)
@@ -160,7 +136,7 @@ static void check_ranges(void)
     for (uint8_t i = 0; i < QUEUE_POSITIONS; i++) {
         const motion_command_t *entry = queue_entry(i);
         require((entry->flags & ~flags) == 0 &&
-                    (entry->count >= 1 || i == QUEUE_CONTINUOUS || known_seen[KNOWN_COUNT_0] > 0 || floods > 0) &&
+                    (entry->count >= 1 || i == QUEUE_CONTINUOUS) &&
                     is_ramp(entry->accel) && is_ramp(entry->decel) && is_possible(entry->velocity, entry->flags),
                 "an entry of the queue is out of its range");
     }
@@ -689,7 +665,6 @@ static struct {
     uint8_t next; /* position that comes next, or NO_ENTRY */
     bool seeded;  /* entries 1..30 are seeds */
     bool restored, saved, undone, edited;
-    known_t fault; /* the line is to be refused, but for this one */
     fuzz_mode_t mode;
     settings_t stored;
     uint8_t array[QUEUE_ARRAY];
@@ -723,7 +698,6 @@ static verdict_t judge_edit(const char *text)
     }
     expected.entry = (uint8_t)position;
     expected.edited = true;
-    expected.fault = kind == READ_OPEN ? KNOWN_COUNT_0 : KNOWN_NONE;
     return kind == READ_OPEN ? EITHER : MUST_BE_TAKEN;
 }
 
@@ -942,7 +916,6 @@ static void check_line(void)
     const bool broken = editor.damaged || editor.too_long;
     expected.entry = expected.next = NO_ENTRY;
     expected.seeded = expected.restored = expected.saved = expected.undone = expected.edited = false;
-    expected.fault = KNOWN_NONE;
     expected.mode = mode;
     expected.stored = stored;
     memcpy(expected.array, before.array, sizeof expected.array);
@@ -981,9 +954,6 @@ static void check_line(void)
     const fuzz_mode_t mode_after = mode;
     mode = mode_before; /* which the line was read in */
     look(&after);
-    if (count == 0) {
-        known_seen[expected.fault]++;
-    }
     check_ranges();
     lines_done++;
     const bool dollar = text[0] == '$' && !broken && mode == MODE_COMMANDS;
@@ -1172,10 +1142,8 @@ static void flood(void)
     }
     store_rests = false;
     rest();
-    floods++;
     unsigned error;
     (void)count_errors(&error);
-    known_seen[KNOWN_BUSY] += modes && error == STATUS_BUSY;
     if (!modes) {
         require(prompt_is_back(), "no prompt after a flood");
         check_pulses();
@@ -1285,9 +1253,6 @@ static void test_no_line_whatever_its_bytes_changes_more_than_it_may(void)
         }
     }
     alarm(0);
-    for (unsigned i = 1; i < KNOWN_COUNT; i++) {
-        printf("known fault, seen %" PRIu64 " times: %s\n", known_seen[i], known_words[i]);
-    }
 }
 
 int main(void)

@@ -36,13 +36,6 @@ static unsigned length;
 static unsigned motions_seen, motions_stopped, refused_lines, restarts;
 static bool restarted; /* the block ends */
 
-/* Known faults of the firmware, not repaired yet; they are told at the end of the run.
- * q5pm0, q5fm: an edit with f or p before m takes a count of 0, or none, into the queue. */
-static unsigned zero_counts;
-/* m3vc1000a999d999t3188: a start wait of 3072..4095 us (its ticks are 0xC000..0xFFFF): after one pulse the motor stands
- * in DECEL for ever. Such lines are typed with another wait. */
-static unsigned waits_changed;
-
 void setUp(void)
 {
     board = NULL;
@@ -169,7 +162,7 @@ static void check_ranges(const look_t *all)
     check_range(all->next >= QUEUE_FIRST && all->next <= QUEUE_LAST && all->pending <= QUEUE_LAST, "a position");
     for (unsigned i = 0; i < QUEUE_POSITIONS; i++) {
         const motion_command_t *entry = &all->entries[i];
-        check_range(entry->flags < 1u << 5 && (entry->count >= 1 || i == QUEUE_CONTINUOUS || zero_counts > 0) && is_ramp(entry->accel) && is_ramp(entry->decel) &&
+        check_range(entry->flags < 1u << 5 && (entry->count >= 1 || i == QUEUE_CONTINUOUS) && is_ramp(entry->accel) && is_ramp(entry->decel) &&
                         is_possible(entry->velocity, entry->flags),
                     "an entry of the queue");
     }
@@ -288,21 +281,6 @@ static void check_position(void)
 
 /* -- one line ---------------------------------------------------------------------------------------------------------- */
 
-/* See waits_changed. */
-static void change_known_waits(void)
-{
-    bytes[length] = 0;
-    for (unsigned i = 0; i < length; i++) {
-        if ((bytes[i] | 0x20) != 't' || bytes[i + 1] < '0' || bytes[i + 1] > '9')
-            continue;
-        const unsigned long wait = strtoul((const char *)bytes + i + 1, NULL, 10);
-        if (wait >= 3072 && wait <= 4095) {
-            bytes[i + 1] = '9';
-            waits_changed++;
-        }
-    }
-}
-
 static void make_lines(void)
 {
     const unsigned lines = fuzz_chance(&fuzz, 20) ? 2 + fuzz_below(&fuzz, MOST_LINES - 1) : 1;
@@ -315,7 +293,6 @@ static void make_lines(void)
         length += line.length;
         bytes[length++] = '\r';
     }
-    change_known_waits();
 }
 
 static bool is_single(void)
@@ -324,28 +301,6 @@ static bool is_single(void)
         if (bytes[i] == '\r' || bytes[i] == '\n')
             return false;
     return true;
-}
-
-/* An entry of the queue without a count. */
-static bool has_count_0_entry(const look_t *all)
-{
-    for (unsigned i = QUEUE_FIRST; i < QUEUE_POSITIONS; i++)
-        if (all->entries[i].count == 0)
-            return true;
-    return false;
-}
-
-/* The line is such an edit: see zero_counts. */
-static bool has_count_0(uint8_t mode)
-{
-    const char *text = editor.text;
-    if (mode == MODE_COMMANDS && (*text++ | 0x20) != 'q')
-        return false;
-    uint32_t position;
-    motion_command_t edited;
-    const motion_command_t entry = {.count = 1};
-    return reference_number(&text, QUEUE_FIRST, QUEUE_LAST, &position) &&
-           reference_edit(text, &entry, &edited) == READ_OPEN;
 }
 
 static bool same_look(const look_t *a, const look_t *b)
@@ -383,9 +338,6 @@ static void one_turn(void)
             fail("the motor does not stop");
     }
     look_t after = look();
-    if (single && before.mode <= MODE_QUEUE && errors == 0 && has_count_0(before.mode))
-        zero_counts++;
-    zero_counts += !single && has_count_0_entry(&after) && !has_count_0_entry(&before);
     check_ranges(&after);
     const size_t made = train.count - made_before;
     if (single) {
@@ -492,8 +444,6 @@ static void test_no_damaged_line_loses_the_prompt_resets_or_makes_a_pulse_of_its
             fflush(stdout);
         }
     }
-    printf("known fault: %u edits such as q5pm0 have taken a count of 0 into the queue\n", zero_counts);
-    printf("known fault: %u start waits of 3072..4095 us were not typed\n", waits_changed);
 }
 
 int main(void)

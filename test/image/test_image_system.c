@@ -228,6 +228,8 @@ static void test_the_queue_is_saved_and_restored(void)
     char saved[4000];
     snprintf(saved, sizeof saved, "%s", image_display("q"));
     image_do("qs");
+    image_refused("qc", "?11 busy"); /* or the cleared queue would be saved */
+    image_refused("qr", "?11 busy");
     image_run(WRITTEN);
     image_do("qc");
     image_do("q4m44");
