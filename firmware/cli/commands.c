@@ -159,7 +159,7 @@ static status_t command_run_array(const char *rest)
 }
 
 /* Unless the display is refused. */
-static NOINLINE status_t enter(uint8_t new_mode, display_t display)
+static status_t enter(uint8_t new_mode, display_t display)
 {
     const status_t status = display_request(display);
     if (status == STATUS_OK) {
@@ -498,7 +498,7 @@ void commands_read_ahead(const char *line, uint8_t length)
 }
 
 /* By the table. */
-static NOINLINE status_t execute_by_table(const char *line)
+static status_t execute_by_table(const char *line)
 {
     if (!more(line[0])) {
         return STATUS_OK;
@@ -557,7 +557,7 @@ bool commands_at_once(char character)
     return true;
 }
 
-NOINLINE const char *commands_prompt(void)
+const char *commands_prompt(void)
 {
     return mode == MODE_QUEUE ? FLASH_TEXT("Q>") : mode == MODE_ARRAY ? FLASH_TEXT("X>") : FLASH_TEXT("SAC>");
 }

@@ -249,7 +249,7 @@ static NOINLINE const char *behind(const char *text, uint8_t mark)
 }
 
 /* Some characters, or a field. */
-static NOINLINE void print_piece(void)
+static void print_piece(void)
 {
     motion_command_t defaults; /* or a row of the queue: the command whose values are shown */
     const motion_command_t *command = &defaults;

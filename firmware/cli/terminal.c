@@ -127,7 +127,7 @@ static bool echo(void)
 }
 
 /* A character was taken back: from the screen too, or the line is shown anew when there is room. */
-static NOINLINE void erase(void)
+static void erase(void)
 {
     if (terminal.echoed <= line.length) {
         return; /* it had not been echoed */
@@ -140,7 +140,7 @@ static NOINLINE void erase(void)
     terminal.echoed--;
 }
 
-static NOINLINE void end_line(void)
+static void end_line(void)
 {
     struct terminal *const t = self();
     const uint8_t timed = line_begun(&line) ? t->timing : 0;
@@ -212,7 +212,7 @@ static line_event_t take(uint8_t *bytes)
     return LINE_APPENDED;
 }
 
-bool terminal_poll(void)
+NOINLINE bool terminal_poll(void)
 {
     uint8_t bytes = BYTES_AT_ONCE; /* still to be taken in this round */
     bool worked = false;

@@ -62,7 +62,7 @@ static NOINLINE uint8_t valid_mark(uint8_t first, uint16_t bytes)
     return crc == 0 && mark < 0x80 ? mark : NOT_VALID;
 }
 
-static uint8_t next_sequence(void)
+static NOINLINE uint8_t next_sequence(void)
 {
     return (uint8_t)(((the_store.sequence + 1) & SEQUENCE) | SEQUENCE_MARK);
 }
@@ -151,7 +151,7 @@ uint8_t store_busy(void)
 }
 
 /* Byte i of the record that the present job writes. */
-static NOINLINE uint8_t wanted_byte(uint16_t i)
+static uint8_t wanted_byte(uint16_t i)
 {
     struct store *const store = self();
     if (!(store->jobs & JOB_SETTINGS)) {

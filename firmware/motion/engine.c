@@ -895,7 +895,7 @@ static uint32_t wait_ticks(uint32_t us)
 /* Lets the next command follow the one that has been emitted: exactly one interval after its last pulse where there
  * is time to plan it and to emit its first intervals, otherwise as soon as possible after its end. Not long before, so
  * that the running command can still be cut without the next one. */
-static void join_next(void)
+static NOINLINE void join_next(void)
 {
     step_snapshot_t at = step_port_snapshot();
     uint8_t loaded = (uint8_t)(at.tail - SEGMENT_BYTES);
@@ -1081,7 +1081,7 @@ void engine_stop(void)
 
 /* Ends the running command after what is to be played soon. Returns the interval there in ticks; 0: nothing to be cut
  * (it ends by itself now, or it stands in the middle of a wait or of an interval longer than that of slow speed). */
-static uint32_t cut(void)
+static NOINLINE uint32_t cut(void)
 {
     allow_hold(0);
     step_snapshot_t at = step_port_snapshot();
@@ -1173,7 +1173,7 @@ static void end_command(accel_code_t decel, bool linear)
     engine.stage = STAGE_RUN;
 }
 
-void engine_stop_graceful(accel_code_t decel, bool linear)
+NOINLINE void engine_stop_graceful(accel_code_t decel, bool linear)
 {
     engine.next = 0;
     end_command(decel, linear);

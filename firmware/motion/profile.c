@@ -219,7 +219,7 @@ static bool split(profile_t *profile, wide_t *wide_accel, wide_t *wide_decel, ui
     return truncated;
 }
 
-void profile_plan(profile_t *profile, const profile_basis_t *basis, const motion_command_t *command, uint32_t v_in)
+NOINLINE void profile_plan(profile_t *profile, const profile_basis_t *basis, const motion_command_t *command, uint32_t v_in)
 {
     uint8_t factor_log2 = basis->factor_log2;
     uint32_t cycle_us = profile_cycle_us(basis, command);

@@ -42,7 +42,7 @@ static void revolution(motion_command_t *seed)
     }
 }
 
-static NOINLINE uint8_t after(uint8_t position)
+static uint8_t after(uint8_t position)
 {
     return position == QUEUE_LAST ? QUEUE_FIRST : (uint8_t)(position + 1);
 }
@@ -323,7 +323,7 @@ static NOINLINE status_t may_run(uint8_t first, uint8_t last)
     return status;
 }
 
-static void begin_run(run_t what)
+static NOINLINE void begin_run(run_t what)
 {
     run = what;
     at = 0;
@@ -331,7 +331,7 @@ static void begin_run(run_t what)
     (void)offer();
 }
 
-NOINLINE status_t queue_loop_bound(queue_bound_t bound, uint8_t position)
+status_t queue_loop_bound(queue_bound_t bound, uint8_t position)
 {
     const uint8_t other = bounds[1 - bound];
     if (position == other) {
@@ -403,7 +403,7 @@ NOINLINE status_t queue_array_run(uint16_t count)
     return STATUS_OK;
 }
 
-void queue_loop_end(void)
+NOINLINE void queue_loop_end(void)
 {
     end_loop();
     if (is_continuous()) {

@@ -698,14 +698,29 @@ static verdict_t judge_edit(const char *text)
     }
     expected.entry = (uint8_t)position;
     expected.edited = true;
-    return kind == READ_OPEN ? EITHER : MUST_BE_TAKEN;
+    return verdict(kind != READ_OPEN);
+}
+
+/* Not what settings in force since a warm boot have made impossible. */
+static bool can_run(uint8_t position)
+{
+    return is_possible_now(before.entries[position].velocity, before.entries[position].flags);
+}
+
+static bool array_can_run(void)
+{
+    bool all = before.array[0] != 0 && !engine_fake.estop;
+    for (uint8_t i = 0; i < QUEUE_ARRAY && before.array[i] != 0; i++) {
+        all = all && can_run(before.array[i]);
+    }
+    return all;
 }
 
 static verdict_t judge_array(const char *text)
 {
     uint32_t entry, position;
     if (!reference_number(&text, 0, 30, &entry) || *text++ != ',' || !reference_number(&text, 0, 30, &position) ||
-        !is_end(*text)) {
+        !is_end(*text) || (position != 0 && !can_run((uint8_t)position))) {
         return MUST_BE_REFUSED;
     }
     expected.array[entry] = (uint8_t)position;
@@ -774,18 +789,25 @@ static verdict_t judge(const char *text)
             expected.mode = MODE_QUEUE;
         } else if (two && second == 'c') {
             expected.seeded = true;
+            return store_busy() ? EITHER : MUST_BE_TAKEN; /* it may have been saved by the end of the line */
         } else if (two && second == 's') {
             expected.saved = true;
         } else if (two && second == 'r') {
             expected.restored = true;
-            return verdict(!snapshot_broken);
+            return store_busy() ? EITHER : verdict(!snapshot_broken);
         } else if (!alone) {
             return judge_edit(text + 1);
         }
         return MUST_BE_TAKEN;
     case 'l':
         switch (second) {
-        case 'a': return verdict(two && !engine_fake.estop);
+        case 'a': {
+            bool all = two && !engine_fake.estop;
+            for (uint8_t i = QUEUE_FIRST; i <= QUEUE_LAST; i++) {
+                all = all && can_run(i);
+            }
+            return verdict(all);
+        }
         case 's':
         case 'f':
             if (judge_number(text + 2, QUEUE_FIRST, QUEUE_LAST) == MUST_BE_REFUSED) {
@@ -797,7 +819,7 @@ static verdict_t judge(const char *text)
             if (alone) {
                 return MUST_BE_TAKEN;
             }
-            if (judge_number(text + 1, 0, 65535) == MUST_BE_REFUSED || before.array[0] == 0 || engine_fake.estop) {
+            if (judge_number(text + 1, 0, 65535) == MUST_BE_REFUSED || !array_can_run()) {
                 return MUST_BE_REFUSED;
             }
             expected.next = before.array[0];
@@ -812,14 +834,15 @@ static verdict_t judge(const char *text)
             return MUST_BE_TAKEN;
         }
         if (two && second == 'l') {
-            return verdict(before.array[0] != 0 && !engine_fake.estop);
+            return verdict(array_can_run());
         }
         if (alone || (two && second == 'd')) {
             return MUST_BE_TAKEN;
         } else {
             const char *rest = text + 1;
             uint32_t position;
-            if (!reference_number(&rest, QUEUE_FIRST, QUEUE_LAST, &position) || !is_end(*rest) || engine_fake.estop) {
+            if (!reference_number(&rest, QUEUE_FIRST, QUEUE_LAST, &position) || !is_end(*rest) || engine_fake.estop ||
+                !can_run((uint8_t)position)) {
                 return MUST_BE_REFUSED;
             }
             expected.next = (uint8_t)position;
