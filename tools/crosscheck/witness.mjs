@@ -21,6 +21,8 @@ const DIR_BIT = 1 << 5;
 const BYTE_CYCLES = 10 * (CPU_HZ / 38400);
 const RX_DELAY = 153 * 26 + 13;
 const RXC_BIT = 1 << 7;
+const TXC_BIT = 0x40;
+const STATUS_BITS = 0xbc; /* RXC0, UDRE0, FE0, DOR0, UPE0 */
 const RXEN_BIT = 1 << 4;
 const FAST_PWM = 3; /* avr8js' number for the family of modes */
 
@@ -49,6 +51,17 @@ function keepReceived(cpu, usart) {
     };
 }
 
+/* In avr8js a write of UCSR0A clears all its flags; on the chip it clears TXC0 where a one is written, and no other. */
+function keepFlags(cpu, usart) {
+    const { UCSRA } = usart.config;
+    const write = cpu.writeHooks[UCSRA];
+    cpu.writeHooks[UCSRA] = (value, before, ...rest) => {
+        const written = write(value, before, ...rest);
+        cpu.data[UCSRA] |= before & (STATUS_BITS | (TXC_BIT & ~value));
+        return written;
+    };
+}
+
 /* typed: [{ cycle, text }], bytes back to back, the first start bit at that cycle.
  * Returns { edges: [{ raw, exact, dir }], text }: raw is the cycle at which avr8js has moved the pin, exact
  * the cycle at which its counter met OCR1B. */
@@ -70,6 +83,7 @@ export function runWitness({ hexPath, typed = [], untilCycle }) {
     const usart = new AVRUSART(cpu, avr8js.usart0Config, CPU_HZ);
     usart.UDRE.constant = true; /* or the flag is lost when its vector is entered */
     keepReceived(cpu, usart);
+    keepFlags(cpu, usart);
 
     let text = '';
     usart.onByteTransmit = (byte) => {
