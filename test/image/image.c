@@ -261,6 +261,13 @@ void image_power_on_with(const uint8_t *eeprom)
     image_load_settings();
 }
 
+void image_boot_again(void)
+{
+    image_load_settings();
+    image_take_text();
+    image_prompt();
+}
+
 void image_poke_setting(size_t offset, size_t bytes, uint32_t value)
 {
     uint16_t address = (uint16_t)(address_of("settings") + offset);

@@ -39,6 +39,7 @@ void image_power_on_with(const uint8_t *eeprom); /* the same, with these content
 void image_load_settings(void);                  /* after a reset: on to there */
 void image_prompt(void);   /* on to the first prompt; what was printed and recorded until then is forgotten */
 void image_boot(void);     /* both */
+void image_boot_again(void); /* after a reset: on to the first prompt */
 void image_off(void);
 
 /* One parameter in RAM before anything has read it; the firmware's struct has no padding on either machine. */

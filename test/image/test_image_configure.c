@@ -32,19 +32,12 @@ void tearDown(void)
     image_off();
 }
 
-static void boot_again(void)
-{
-    image_load_settings();
-    image_take_text();
-    image_prompt();
-}
-
 /* Off and on again after so many cycles; the EEPROM keeps what it holds, a write that is going on is torn. */
 static void power_cycle_after(uint64_t cycles)
 {
     board_eeprom_cut_at(board, board_cycle(board) + cycles);
     image_run(cycles + 1);
-    boot_again();
+    image_boot_again();
 }
 
 static void power_cycle(void)
@@ -55,7 +48,7 @@ static void power_cycle(void)
 static void reset(void)
 {
     board_reset(board, BOARD_RESET_EXTERNAL);
-    boot_again();
+    image_boot_again();
 }
 
 static void boot_with(const uint8_t *eeprom)

@@ -20,13 +20,6 @@ void tearDown(void)
     image_off();
 }
 
-static void boot_again(void)
-{
-    image_load_settings();
-    image_take_text();
-    image_prompt();
-}
-
 static void lose_power(void)
 {
     board_eeprom_cut_at(board, board_cycle(board) + 1);
@@ -36,7 +29,7 @@ static void lose_power(void)
 static void power_cycle(void)
 {
     lose_power();
-    boot_again();
+    image_boot_again();
 }
 
 /* -- PIN ----------------------------------------------------------------------------------------------------------- */
@@ -399,7 +392,7 @@ static void test_rst_at_power_on_restores_the_factory_settings_for_good(void)
     image_run(WRITTEN);
     lose_power();
     board_pin_drive(board, RST, 0);
-    boot_again();
+    image_boot_again();
     image_run(WRITTEN);
     board_pin_drive(board, RST, -1);
     assert_factory();
