@@ -15,7 +15,11 @@ volatile uint8_t usart_rx_head, usart_rx_tail, usart_tx_head, usart_tx_tail;
 void terminal_port_init(uint32_t baud)
 {
     const baud_divisor_t divisor = baud_divisor(baud);
-    UCSR0A = divisor.u2x ? (uint8_t)_BV(U2X0) : 0;
+    const uint8_t u2x = divisor.u2x ? _BV(U2X0) : 0;
+    if (UBRR0 == divisor.ubrr && (UCSR0A & _BV(U2X0)) == u2x && UCSR0B != 0) {
+        return; /* as it is: a write would spoil what is being received */
+    }
+    UCSR0A = u2x;
     UBRR0 = divisor.ubrr;
     UCSR0C = _BV(UCSZ01) | _BV(UCSZ00); /* 8 data bits, no parity, 1 stop bit */
     UCSR0B = USART_CONTROL | _BV(RXCIE0);

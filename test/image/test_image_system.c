@@ -188,6 +188,21 @@ static void test_a_warm_boot_in_motion_stops_it(void)
     image_idle(LONG_WAIT);
 }
 
+/* What is typed behind $R, while it waits for its turn and while it is executed, is taken. BOO-007 */
+static void test_nothing_typed_behind_a_warm_boot_is_lost(void)
+{
+    for (unsigned more = 0; more < 8; more++) {
+        image_train_clear();
+        char lines[60];
+        snprintf(lines, sizeof lines, "$R\rm%uvc1000a999d999\r", 10 + more);
+        image_send(lines);
+        image_sent();
+        image_run(200 * MS);
+        image_assert_pulses(10 + more);
+        image_run(more * 37); /* another phase */
+    }
+}
+
 /* $R with another rate: the answer comes at the new one. CFG-036 */
 static void test_a_warm_boot_changes_the_rate_of_the_port(void)
 {
@@ -556,6 +571,7 @@ int main(void)
     RUN_TEST(test_commands_stream_at_38400_bd_without_a_stall);
     RUN_TEST(test_a_warm_boot_loads_what_is_configured_and_keeps_the_queue);
     RUN_TEST(test_a_warm_boot_in_motion_stops_it);
+    RUN_TEST(test_nothing_typed_behind_a_warm_boot_is_lost);
     RUN_TEST(test_a_warm_boot_changes_the_rate_of_the_port);
     RUN_TEST(test_one_shots_and_continuous_motion_leave_the_session_alone);
     RUN_TEST(test_the_queue_is_saved_and_restored);
