@@ -795,8 +795,9 @@ static void fill(void)
     uint16_t periods = 0;
     uint8_t offset = step_head;
     while ((ticks < START_TICKS || periods < START_PERIODS ||
-            (!engine.playing && (engine.ramp_state == MOTION_ACCEL || engine.ramp_state == MOTION_DECEL) &&
-             (ramp.steep > 1 || ramp.group_log2 == 0))) &&
+            (!engine.playing && (((engine.ramp_state == MOTION_ACCEL || engine.ramp_state == MOTION_DECEL) &&
+                                  (ramp.steep > 1 || ramp.group_log2 == 0)) ||
+                                 (profile.cruise_pulses == 0 && ticks < CUT_KEEP_TICKS)))) &&
            ring_free() >= RING_RESERVE && emit()) {
         uint16_t first = counted_periods(segment_at(offset));
         ticks += ticks_between(offset, first, step_head);

@@ -136,6 +136,23 @@ static void test_2400_rpm_in_full_steps(void)
     TEST_ASSERT_EQUAL(125 * US, train.interval_min);
 }
 
+/* STA, HAR: short motions at 260 kHz that end in a steep ramp: it has to be there when the few pulses before it are out */
+static void test_a_steep_end_behind_few_fast_pulses_is_planned_in_time(void)
+{
+    static const char *const lines[] = {"m90d545v19486a999", "m200d545v19486a999", "m90d545v15000a999", "m30d300v19486a999"};
+    static const unsigned pulses[] = {360, 800, 360, 120};
+    for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++) {
+        image_off();
+        image_power_on();
+        IMAGE_SET(ustep, 2);
+        image_prompt();
+        image_do(lines[i]);
+        image_idle(LONG_WAIT);
+        image_assert_pulses(pulses[i]);
+        TEST_ASSERT_EQUAL(pulses[i], image_position()); /* and no fault */
+    }
+}
+
 /* PER-004: commands stream at the port's rate while the motor moves */
 static void test_commands_stream_at_38400_bd_without_a_stall(void)
 {
@@ -568,6 +585,7 @@ int main(void)
     RUN_TEST(test_microsteps_divide_the_period);
     RUN_TEST(test_33_khz_at_16_microsteps_is_kept);
     RUN_TEST(test_2400_rpm_in_full_steps);
+    RUN_TEST(test_a_steep_end_behind_few_fast_pulses_is_planned_in_time);
     RUN_TEST(test_commands_stream_at_38400_bd_without_a_stall);
     RUN_TEST(test_a_warm_boot_loads_what_is_configured_and_keeps_the_queue);
     RUN_TEST(test_a_warm_boot_in_motion_stops_it);
