@@ -420,12 +420,6 @@ static const command_row_t rows[] FLASH = {
 #include "cli/commands.def"
 #undef COMMAND
 };
-enum {
-#define COMMAND(name, first, second, case_rule, argument, action, help) ROW_##name,
-#include "cli/commands.def"
-#undef COMMAND
-    ROWS
-};
 
 const char commands_help[] FLASH =
 #define HELP(form, words) form "\t" words "\n"
@@ -448,7 +442,7 @@ static inline uint8_t differs(uint8_t letter, char typed, uint8_t first)
 static status_t dispatch(const char *line)
 {
     status_t status = STATUS_UNKNOWN_COMMAND;
-    for (const command_row_t *row = rows; row < rows + ROWS; row++) {
+    for (const command_row_t *row = rows; row < rows + sizeof rows / sizeof rows[0]; row++) {
         const uint8_t first = flash_u8(&row->first);
         const char *rest = line;
         if (differs(first & LETTER, *rest++, first)) {
@@ -474,7 +468,7 @@ static status_t dispatch(const char *line)
 void commands_init(void)
 {
     session_init();
-    AT_BOOT_ZERO(debugging);
+    debugging = false; /* (a warm boot comes here too) */
     mode = MODE_COMMANDS;
     AT_BOOT_ZERO(characters_ahead);
 }

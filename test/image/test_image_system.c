@@ -205,6 +205,15 @@ static void test_a_warm_boot_in_motion_stops_it(void)
     image_idle(LONG_WAIT);
 }
 
+/* BOO-007, TRM-008 */
+static void test_a_warm_boot_ends_debug_mode(void)
+{
+    image_ask("b");
+    image_assert_holds(image_display("q"), "\n0\t");
+    image_ask("$R");
+    TEST_ASSERT_NULL(strstr(image_display("q"), "\n0\t"));
+}
+
 /* What is typed behind $R, while it waits for its turn and while it is executed, is taken. BOO-007 */
 static void test_nothing_typed_behind_a_warm_boot_is_lost(void)
 {
@@ -589,6 +598,7 @@ int main(void)
     RUN_TEST(test_commands_stream_at_38400_bd_without_a_stall);
     RUN_TEST(test_a_warm_boot_loads_what_is_configured_and_keeps_the_queue);
     RUN_TEST(test_a_warm_boot_in_motion_stops_it);
+    RUN_TEST(test_a_warm_boot_ends_debug_mode);
     RUN_TEST(test_nothing_typed_behind_a_warm_boot_is_lost);
     RUN_TEST(test_a_warm_boot_changes_the_rate_of_the_port);
     RUN_TEST(test_one_shots_and_continuous_motion_leave_the_session_alone);
