@@ -2,7 +2,8 @@
  *
  * An interrupt that makes work for the main loop writes any value but 0 to wake_flag. The main loop clears it, polls
  * everything, and calls wake_sleep() when no poll found work: if the flag has been raised since, it returns at once.
- * The step interrupt need not: its timer interrupts again within a period (4 ms at most) until the main loop stops it.
+ * The step interrupt need not as long as it goes on: wake_sleep() returns after each. Where it ends, because the ring has
+ * run empty, it raises the flag: nothing comes after it.
  * Shared:  wake_flag is written by interrupts (non-zero) and by the main loop (zero): a single byte.
  * Context: wake_sleep() in the main loop, with interrupts enabled. Errors: none.
  * Tests:   test/image (a command typed while the processor sleeps starts at once). */

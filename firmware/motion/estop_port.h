@@ -2,7 +2,7 @@
  *
  * At its falling edge the interrupt ends the pulse train by itself: a pulse that has begun is completed, none begins
  * within 3 us or later (docs/design.md). The main loop does the rest.
- * Context: main loop. Tests: test/image/test_image_estop.c. */
+ * Context: main loop. Errors: none. Tests: test/image/test_image_estop.c. */
 #ifndef MOTION_ESTOP_PORT_H
 #define MOTION_ESTOP_PORT_H
 

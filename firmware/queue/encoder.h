@@ -17,8 +17,4 @@ void encoder_toggle(void); /* $n */
 
 bool encoder_throttles(void); /* the mode in force: throttle (EnT), or follow (EnF) */
 
-/* Continuous motion becomes so many RPM faster, or slower (to 1 RPM at least), by its own acceleration; other motion
- * does not change. In queue.c, when there is continuous motion. */
-void queue_throttle(int8_t rpm);
-
 #endif

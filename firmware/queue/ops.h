@@ -4,7 +4,7 @@
  * last interval; OPSB is its inverse. One pair for every command, however short; none for single pulses, nor for a command
  * that is ended in its start wait. Soft ops: at the same moments DC1 and DC2 go to the terminal port as bare bytes; one
  * that finds no room there is left out, nothing waits.
- * Context: main loop.
+ * Context: main loop. Errors: none.
  * Tests:   test/host/test_ops.c, test/image/test_image_ops.c
  * Source:  manual lines 616-620, 654, 818, 857, 993-995; decisions A-OPS-01, -02, -04. */
 #ifndef QUEUE_OPS_H

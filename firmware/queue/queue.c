@@ -4,7 +4,6 @@
 #include "eeprom/store.h"
 #include "motion/engine.h"
 #include "motion/estop_port.h"
-#include "queue/encoder.h"
 #include "queue/session.h"
 #include "settings.h"
 

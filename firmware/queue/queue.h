@@ -55,6 +55,9 @@ status_t queue_preempt_with(uint8_t position, const motion_command_t *command);
 /* While the continuous command runs, it goes on with this velocity and acceleration; otherwise nothing. */
 void queue_follow(const motion_command_t *command);
 
+/* It becomes so many RPM faster, or slower (to 1 RPM at least), by its own acceleration; other motion does not change. */
+void queue_throttle(int8_t rpm);
+
 /* Gives the engine what comes next; true if anything changed. Call often. */
 bool queue_poll(void);
 
