@@ -215,20 +215,29 @@ wide_root:                      /* r24 x; returns r22-r25 */
         .global wide_shift
         .type wide_shift, @function
 wide_shift:                     /* r24 x, r22 bits */
-        movw    r30, r24
-        adiw    r30, 8
-1:      subi    r22, 1
-        brcs    3f
+1:      movw    r30, r24
+        tst     r22
+        breq    5f
         ldi     r18, 8
+        brmi    3f
+        dec     r22
+        adiw    r30, 8
         clc
 2:      ld      r19, -Z
         ror     r19
         st      Z, r19
         dec     r18
         brne    2b
-        adiw    r30, 8
         rjmp    1b
-3:      ret
+3:      inc     r22
+        clc
+4:      ld      r19, Z
+        rol     r19
+        st      Z+, r19
+        dec     r18
+        brne    4b
+        rjmp    1b
+5:      ret
 
         .section .text.wide_bits, "ax", @progbits
         .global wide_bits

@@ -18,7 +18,7 @@ void wide_multiply(wide_t *product, const wide_t *x, const wide_t *y); /* produc
 uint32_t wide_divide(wide_t *x, uint32_t divisor); /* x /= divisor, truncated; returns the remainder. divisor >= 1 */
 uint32_t wide_root(const wide_t *x);               /* sqrt(x), truncated */
 uint8_t wide_bits(const wide_t *x);                /* of x without its leading zeros: 0..64 */
-void wide_shift(wide_t *x, uint8_t bits);          /* x >>= bits, without sign; bits < 64 */
+void wide_shift(wide_t *x, int8_t bits);           /* x >>= bits, without sign; below 0: x <<= -bits; -64 < bits < 64 */
 uint32_t wide_fraction(uint32_t x, uint32_t y_q32); /* x * y / 2^32, less up to 4: products of the low bytes are left out */
 #else
 static inline void wide_copy(wide_t *to, const wide_t *from)
@@ -64,9 +64,9 @@ static inline uint8_t wide_bits(const wide_t *x)
         bits++;
     return bits;
 }
-static inline void wide_shift(wide_t *x, uint8_t bits)
+static inline void wide_shift(wide_t *x, int8_t bits)
 {
-    *x >>= bits;
+    *x = bits < 0 ? *x << -bits : *x >> bits;
 }
 static inline uint32_t wide_fraction(uint32_t x, uint32_t y_q32)
 {

@@ -93,6 +93,17 @@ static void test_a_fraction_is_the_upper_half_of_the_product_or_up_to_four_less(
     TEST_ASSERT_EQUAL_UINT32(0x00123456u, wide_fraction(0x12345600u, 0x01000000u));
 }
 
+static void test_shifts_go_both_ways_and_lose_what_leaves(void)
+{
+    uint64_t state = 4;
+    for (int8_t bits = -63; bits <= 63; bits++) {
+        wide_t x = next_value(&state);
+        wide_t shifted = x;
+        wide_shift(&shifted, bits);
+        TEST_ASSERT_TRUE(shifted == (bits < 0 ? x << -bits : x >> bits));
+    }
+}
+
 static void test_32_bits_are_taken_from_any_of_the_lower_bytes(void)
 {
     wide_t x = 0x8877665544332211u;
@@ -114,6 +125,7 @@ int main(void)
     RUN_TEST(test_products_of_negative_numbers_are_right_modulo_two_to_the_64);
     RUN_TEST(test_a_factor_may_be_multiplied_by_itself);
     RUN_TEST(test_a_fraction_is_the_upper_half_of_the_product_or_up_to_four_less);
+    RUN_TEST(test_shifts_go_both_ways_and_lose_what_leaves);
     RUN_TEST(test_32_bits_are_taken_from_any_of_the_lower_bytes);
     return UNITY_END();
 }
