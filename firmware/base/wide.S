@@ -1,6 +1,6 @@
 /* See wide.h. Cycles with call and return: add, subtract 96; multiply about 20 + 45 per zero-free byte of x and 13 per
- * product of two bytes: 420 for a 32-bit x; divide about 140 per byte of the quotient; root 1,200; shift 70
- * per bit; copy 80; fraction 80. Little-endian, arguments by the avr-gcc calling convention. */
+ * product of two bytes: 420 for a 32-bit x; divide about 140 per byte of the quotient; root 1,200; shift 60
+ * per whole byte and 75 per bit; copy 80; fraction 80. Little-endian, arguments by the avr-gcc calling convention. */
 
         .section .text.wide_copy, "ax", @progbits
         .global wide_copy
@@ -216,12 +216,22 @@ wide_root:                      /* r24 x; returns r22-r25 */
         .type wide_shift, @function
 wide_shift:                     /* r24 x, r22 bits */
 1:      movw    r30, r24
+        ldi     r18, 7
         tst     r22
-        breq    5f
-        ldi     r18, 8
-        brmi    3f
-        dec     r22
+        breq    7f
+        brmi    4f
+        cpi     r22, 8
+        brlo    2f
+        subi    r22, 8
+3:      ldd     r19, Z + 1      /* a whole byte */
+        st      Z+, r19
+        dec     r18
+        brne    3b
+        st      Z, r1
+        rjmp    1b
+2:      dec     r22
         adiw    r30, 8
+        inc     r18
         clc
 2:      ld      r19, -Z
         ror     r19
@@ -229,15 +239,26 @@ wide_shift:                     /* r24 x, r22 bits */
         dec     r18
         brne    2b
         rjmp    1b
-3:      inc     r22
+4:      cpi     r22, -7
+        brge    6f
+        subi    r22, -8
+        adiw    r30, 7
+5:      ld      r19, -Z
+        std     Z + 1, r19
+        dec     r18
+        brne    5b
+        st      Z, r1
+        rjmp    1b
+6:      inc     r22
+        inc     r18
         clc
-4:      ld      r19, Z
+6:      ld      r19, Z
         rol     r19
         st      Z+, r19
         dec     r18
-        brne    4b
+        brne    6b
         rjmp    1b
-5:      ret
+7:      ret
 
         .section .text.wide_bits, "ax", @progbits
         .global wide_bits

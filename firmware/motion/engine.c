@@ -417,10 +417,7 @@ static NOINLINE void begin_ramp(motion_state_t state)
     if (engine.ramp_state == state)
         return;
     engine.ramp_state = state;
-    if (state == MOTION_ACCEL)
-        profile_begin_accel(&profile, &basis, &ramp);
-    else
-        profile_begin_decel(&profile, &basis, &ramp);
+    profile_begin_ramp(&profile, &basis, state == MOTION_ACCEL, &ramp);
 }
 
 /* Does the phase have its longer intervals first? */
@@ -516,7 +513,7 @@ static void emit_ramp(uint32_t at_most)
     uint8_t pulses = 0;
     do {
         ramp_time_t sum;
-        uint16_t group = ramp_next(&ramp, &basis.ramp, at_most, &sum, &block);
+        uint16_t group = ramp_next(&ramp, at_most, &sum, &block);
         if (block.runs) {
             begin_block();
             break;
@@ -575,7 +572,7 @@ static void begin_closing(void)
         last.ticks = p->cruise.ticks_q8 >> 8;
         last.frac_q16 = (uint16_t)(p->cruise.ticks_q8 << 8);
     } else {
-        (void)ramp_next(&ramp, &basis.ramp, 1, &last, &block);
+        (void)ramp_next(&ramp, 1, &last, &block);
     }
     uint32_t ticks = take_carry(last.ticks, last.frac_q16);
     chunks += ticks >> PROFILE_CHUNK_LOG2;

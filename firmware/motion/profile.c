@@ -20,6 +20,8 @@ void profile_basis(profile_basis_t *basis, uint16_t steps_per_rev, uint8_t facto
 /* Velocity and cycle are each other's inverse. */
 static NOINLINE uint32_t inverse(const profile_basis_t *basis, const motion_command_t *command)
 {
+    NEAR(command);
+    NEAR(basis);
     return basis->us_rpm / command->velocity;
 }
 
@@ -53,17 +55,11 @@ status_t profile_check(const profile_basis_t *basis, const motion_command_t *com
     return command->count > most ? STATUS_NUMBER_TOO_LARGE : STATUS_OK;
 }
 
-static void square(wide_t *x, uint32_t v)
-{
-    wide_t wide_v = v;
-    wide_multiply(x, &wide_v, &wide_v);
-}
-
 /* floor(V^2 / (2 alpha a)) steps from standstill = (100 RPM)^2 * steps_per_rev * pi / 360000 / centi. Up to 500,000
  * pulses a second the product fits 64 bits. 9 / 1031324 is pi / 360000 to 3 parts in 10^8. */
 static void linear_steps(wide_t *steps, const profile_basis_t *basis, uint32_t v, uint32_t centi)
 {
-    square(steps, v >> basis->factor_log2);
+    ramp_square(steps, v >> basis->factor_log2);
     ramp_multiply(steps, basis->steps_per_rev * (uint32_t)9);
     wide_divide(steps, 1031324);
     wide_divide(steps, centi);
@@ -131,7 +127,7 @@ static NOINLINE uint32_t limited(const profile_t *profile, uint32_t v)
 }
 
 /* The velocity that the acceleration reaches instead of v_peak, and that of its last interval: v_exit. */
-static NOINLINE void limit_peak(profile_t *profile, const profile_basis_t *basis)
+static void limit_peak(profile_t *profile, const profile_basis_t *basis)
 {
     NEAR(profile);
     uint32_t v_peak = profile->v_start;
@@ -143,7 +139,7 @@ static NOINLINE void limit_peak(profile_t *profile, const profile_basis_t *basis
     } else if (profile->linear) {
         wide_t v2 = 0;
         if (v_peak != basis->v_slow || !faster)
-            square(&v2, v_peak);
+            ramp_square(&v2, v_peak);
         add_change(&v2, basis, pulses, profile->accel_centi, faster);
         v_peak = root(&v2);
         add_change(&v2, basis, 1, profile->accel_centi, !faster);
@@ -166,7 +162,7 @@ static bool is_steep(const profile_t *profile, const profile_basis_t *basis)
         return profile->v_peak - basis->v_slow > profile->decel_centi * (pulses + step);
     /* The v^2 that is left, after 2 % and four full steps more. */
     wide_t v2;
-    square(&v2, profile->v_peak);
+    ramp_square(&v2, profile->v_peak);
     add_change(&v2, basis, pulses + pulses / 50 + 4 * step, profile->decel_centi, false);
     return !wide_is_negative(&v2);
 }
@@ -263,6 +259,8 @@ NOINLINE void profile_plan(profile_t *profile, const profile_basis_t *basis, con
         profile->cruise_pulses += command->extra_pulses;
     if (profile->cruise_pulses == 0 && (truncated || profile->accel_pulses != 0))
         limit_peak(profile, basis);
+    if (profile->accel_pulses == 0)
+        profile->v_start = v_target; /* bounds that of a linear deceleration */
 
     /* The velocity that stays. */
     if (profile->decel_pulses != 0) {
@@ -286,51 +284,48 @@ void profile_plan_decel(profile_t *profile, const profile_basis_t *basis, uint32
         profile->v_exit = basis->v_slow;
 }
 
-void profile_begin_accel(const profile_t *profile, const profile_basis_t *basis, ramp_t *ramp)
+void profile_begin_ramp(const profile_t *profile, const profile_basis_t *basis, bool accel, ramp_t *ramp)
 {
-    if (!profile->linear) {
-        ramp_begin_harmonic(ramp, &basis->ramp, profile->v_start, profile->accel_centi, profile->faster, UINT32_MAX >> 1);
-        return;
-    }
-    wide_t c;
-    wide_t t = 0;
-    ramp_linear_c(&c, basis->steps_per_rev, basis->factor_log2, profile->accel_centi);
-    if (profile->v_start != basis->v_slow || !profile->faster) {
-        /* From zero to v_start: v / accel = RPM * pi / 30 / (centi / 100) s = units / (100 F) * 2.680825731e9 / centi
-         * sixteenths of a tick */
-        t = profile->v_start;
-        ramp_multiply(&t, 2680825731u);
-        wide_divide(&t, profile->accel_centi * 100u << basis->factor_log2);
-    }
-    /* Whole full steps may pass the target a little: not beyond the interval of the cruise. */
-    const profile_interval_t *cruise = &profile->cruise;
-    ramp_time_t bound;
-    bound.ticks = cruise->chunks >> (32 - PROFILE_CHUNK_LOG2)
-                      ? UINT32_MAX
-                      : (cruise->chunks << PROFILE_CHUNK_LOG2) + (cruise->ticks_q8 >> 8);
-    bound.frac_q16 = (uint16_t)(cruise->ticks_q8 << 8);
-    ramp_begin_linear(ramp, &c, &t, profile->accel_pulses, profile->faster, bound);
-}
-
-void profile_begin_decel(const profile_t *profile, const profile_basis_t *basis, ramp_t *ramp)
-{
+    NEAR(profile);
+    NEAR(basis);
+    NEAR(ramp);
     uint32_t n = profile->decel_pulses;
+    uint32_t v_most = profile->v_start;
+    ramp->linear = profile->linear;
+    ramp->faster = false;
+    ramp->v = 0;
+    if (accel) {
+        ramp->faster = profile->faster;
+        ramp->v = v_most;
+    }
+    ramp->step = accel ? profile->accel_centi : profile->decel_centi;
     if (!profile->linear) {
-        uint32_t step = profile->decel_centi;
-        if (profile->steep_decel)
-            step = (profile->v_peak - basis->v_slow) / n;
-        ramp_begin_harmonic(ramp, &basis->ramp, basis->v_slow + (n - 1) * step, step, false, profile->v_peak);
-        return;
-    }
-    wide_t c;
-    if (profile->steep_decel) {
-        /* From v_peak to zero in n pulses: t = 2 n interval(v_peak), C = t^2 / n. */
-        ramp_time_t interval = ramp_interval(&basis->ramp, profile->v_peak);
-        square(&c, interval.ticks << 4 | interval.frac_q16 >> 12);
-        ramp_multiply(&c, n << 2);
+        ramp->limit.cap = UINT32_MAX >> 1; /* (an acceleration ends before) */
+        if (!accel) {
+            ramp->limit.cap = profile->v_peak;
+            if (profile->steep_decel)
+                ramp->step = (profile->v_peak - basis->v_slow) / n;
+            ramp->v = basis->v_slow + (n - 1) * ramp->step;
+        }
     } else {
-        ramp_linear_c(&c, basis->steps_per_rev, basis->factor_log2, profile->decel_centi);
+        wide_t *bound_q16 = &ramp->limit.bound_q16;
+        if (accel) {
+            /* Whole full steps may pass the target a little: not beyond the interval of the cruise. */
+            *bound_q16 = (profile->cruise.chunks << (PROFILE_CHUNK_LOG2 + 8)) + profile->cruise.ticks_q8;
+            wide_shift(bound_q16, -8);
+            if (profile->faster && v_most == basis->v_slow)
+                ramp->v = 0; /* (decisions 0.2.4) */
+        } else {
+            wide_copy(bound_q16, &basis->ramp.k2_q16);
+            wide_divide(bound_q16, 2 * basis->v_slow);
+        }
+        if (v_most < profile->v_peak)
+            v_most = profile->v_peak;
+        if (!accel && profile->steep_decel) {
+            v_most = profile->v_peak;
+            ramp->step = 0;
+        }
+        ramp->step <<= basis->factor_log2;
     }
-    wide_t t = 0;
-    ramp_begin_linear(ramp, &c, &t, n, false, ramp_interval(&basis->ramp, basis->v_slow));
+    ramp_begin(ramp, &basis->ramp, v_most, n);
 }

@@ -70,8 +70,7 @@ void profile_plan_decel(profile_t *profile, const profile_basis_t *basis, uint32
 /* Full steps of a ramp between two velocities in units, integer (manual lines 89, 265). */
 uint32_t profile_ramp_steps(const profile_basis_t *basis, uint32_t v_from, uint32_t v_to, uint32_t centi, bool linear);
 
-/* Starts the generator for the profile's acceleration or deceleration. */
-void profile_begin_accel(const profile_t *profile, const profile_basis_t *basis, ramp_t *ramp);
-void profile_begin_decel(const profile_t *profile, const profile_basis_t *basis, ramp_t *ramp);
+/* Begins the profile's acceleration, or its deceleration. */
+void profile_begin_ramp(const profile_t *profile, const profile_basis_t *basis, bool accel, ramp_t *ramp);
 
 #endif

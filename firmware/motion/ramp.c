@@ -1,7 +1,8 @@
 /* See ramp.h and docs/design.md. All arithmetic is in integers.
- * Harmonic: the interval in a group's middle, by a division; the law's series around it gives the sum.
- * Linear: the time from standstill at a group's end, by a root. Differences of such times do not drift.
- * How much the law's variable changes in the group, as a part of its value, gives the shape of either. */
+ * Both laws are about velocity. Harmonic: it changes by so much a pulse; the interval in a group's middle is a division's
+ * quotient, and the law's series around it gives the mean. Linear: its square does; a group's pulses over the mean of the
+ * velocities at both ends is its duration, exactly.
+ * By what part of its value the velocity changes in the group gives the shape of either. */
 #include "motion/ramp.h"
 #include "base/flash.h"
 #include "base/inline.h"
@@ -15,7 +16,10 @@
 #define REST_PULSES 64u /* the least that is left for a fast ramp's last run */
 #define GROUP_MAX_TICKS 60000u /* below 65,536 also where it grows more than expected ... */
 #define GROUP_MAX_STEEP_TICKS 49152u /* ... by up to a third, in a steep ramp */
-#define STEEP_BITS 36u /* of C: first intervals below 16,384 ticks */
+/* Of velocity units squared, a pulse, for a hundredth of rad/s^2, times steps_per_rev: 360,000 / pi * 2^15. */
+#define LINEAR_SQUARE_Q15 3754936206u
+#define LINEAR_RATE_LOG2 48u
+#define LINEAR_STEEP_LOG2 (LINEAR_RATE_LOG2 + 2u - 28u) /* first intervals below 2^14 ticks: 4 K^2 / c below 2^28 */
 /* Runs: the interrupt's cycles for two segments, the planner's, and as much for others; and those of each pulse. */
 #define RUN_TICKS 500u
 #define RUN_PULSE_TICKS 24u
@@ -23,6 +27,7 @@
 
 void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev)
 {
+    constants->steps_per_rev = steps_per_rev;
     constants->k2_q16 = 96000000000u * 131072u;
     wide_divide(&constants->k2_q16, steps_per_rev);
 }
@@ -43,9 +48,9 @@ uint32_t ramp_scale(uint32_t a, uint32_t b, uint32_t divisor)
     return (uint32_t)product;
 }
 
-static NOINLINE void divide_k(wide_t *quotient, const ramp_constants_t *constants, uint32_t divisor)
+static NOINLINE void divide_k(wide_t *quotient, const wide_t *k2_q16, uint32_t divisor)
 {
-    wide_copy(quotient, &constants->k2_q16);
+    wide_copy(quotient, k2_q16);
     wide_divide(quotient, divisor);
 }
 
@@ -58,17 +63,18 @@ static void set_time(ramp_time_t *time, const wide_t *q16)
 
 ramp_time_t ramp_interval(const ramp_constants_t *constants, uint32_t v)
 {
+    NEAR(constants);
     wide_t q16;
-    divide_k(&q16, constants, 2 * v);
+    divide_k(&q16, &constants->k2_q16, 2 * v);
     ramp_time_t time;
     set_time(&time, &q16);
     return time;
 }
 
-uint32_t ramp_velocity(const ramp_constants_t *constants, uint32_t ticks)
+NOINLINE uint32_t ramp_velocity(const ramp_constants_t *constants, uint32_t ticks)
 {
     wide_t v2_q16;
-    divide_k(&v2_q16, constants, ticks);
+    divide_k(&v2_q16, &constants->k2_q16, ticks);
     return ((uint32_t)wide_from_byte(&v2_q16, 2) + 1) >> 1;
 }
 
@@ -79,22 +85,12 @@ static NOINLINE void set_ticks(ramp_t *ramp, const wide_t *q16)
     ramp->ticks = ticks > UINT16_MAX ? UINT16_MAX : (uint16_t)ticks;
 }
 
-/* A new ramp: all 0 but this. */
-static NOINLINE void begin(ramp_t *ramp, bool linear, bool faster)
-{
-    memset(ramp, 0, sizeof *ramp);
-    ramp->linear = linear;
-    ramp->faster = faster;
-    ramp->group_log2 = ramp->most_log2 = GROUP_MAX_LOG2;
-}
-
 /* -- groups ------------------------------------------------------------------------------------------------------ */
 
-/* 2^32 * part / whole / 2^halved. The result is below 2^32. */
-static NOINLINE uint32_t ratio_q32(uint32_t part, uint8_t halved, uint32_t whole)
+/* 2^32 * part / whole. The result is below 2^32. */
+static uint32_t ratio_q32(uint32_t part, uint32_t whole)
 {
     wide_t quotient = (wide_t)part << 32;
-    wide_shift(&quotient, halved);
     wide_divide(&quotient, whole);
     return wide_half(&quotient, 0);
 }
@@ -105,14 +101,6 @@ static NOINLINE uint32_t ratio_q32(uint32_t part, uint8_t halved, uint32_t whole
 static NOINLINE uint8_t part_log2(const ramp_t *ramp)
 {
     return ramp->steep > 1 ? 1 : ramp->ticks < 128 ? 2 : 3;
-}
-
-static uint8_t floor_log2(uint16_t n)
-{
-    uint8_t log2 = 0;
-    while (n >>= 1)
-        log2++;
-    return log2;
 }
 
 /* How many pulses the next group has: a power of two whose change, of so much a pulse, and duration are within the limits;
@@ -160,47 +148,6 @@ static NOINLINE uint16_t choose_group(ramp_t *ramp, uint32_t change, uint32_t mo
     return left;
 }
 
-/* The shape of a group of intervals with this mean: as those of the law, whose variable changes by part / 2^32 of its
- * value in the group's middle. Returns mean * part^2; *third_q16: the change of that. */
-static uint32_t shape(block_t *group, uint32_t *third_q16, uint32_t mean_q16, uint32_t part)
-{
-    uint32_t slope = wide_fraction(mean_q16, part);
-    uint32_t curve = wide_fraction(slope, part);
-    group->slope_q16 = (int32_t)slope;
-    *third_q16 = wide_fraction(curve, part);
-    group->runs = 1; /* to be divided */
-    return curve;
-}
-
-/* Intervals that are all alike: how many of those left, and their sum. */
-static NOINLINE uint16_t flat(ramp_t *ramp, uint16_t left, const wide_t *interval_q16, wide_t *sum_q16)
-{
-    set_ticks(ramp, interval_q16);
-    uint16_t pulses = choose_group(ramp, 0, 0, left);
-    ramp->rest = false;
-    wide_copy(sum_q16, interval_q16);
-    ramp_multiply(sum_q16, pulses);
-    return pulses;
-}
-
-/* -- harmonic ---------------------------------------------------------------------------------------------------- */
-
-void ramp_begin_harmonic(ramp_t *ramp, const ramp_constants_t *constants, uint32_t v_first, uint32_t step, bool faster,
-                         uint32_t v_cap)
-{
-    begin(ramp, false, faster);
-    ramp->u.harmonic.next2 = 2 * v_first;
-    ramp->u.harmonic.cap2 = 2 * v_cap;
-    ramp->u.harmonic.step2 = 2 * step;
-    uint32_t k_by_128 = (uint32_t)wide_from_byte(&constants->k2_q16, 3);
-    uint32_t steep = k_by_128 >> 10; /* K / 2^17; a third: 2^18.6 */
-    ramp->steep = (uint8_t)((step > steep) + (3 * step > steep));
-    ramp->u.harmonic.step_q40 = step < k_by_128 >> 1 ? ratio_q32(2 * step, 0, k_by_128) : UINT32_MAX;
-    wide_t interval_q16;
-    divide_k(&interval_q16, constants, 2 * (v_first < v_cap ? v_first : v_cap));
-    set_ticks(ramp, &interval_q16);
-}
-
 /* The mean of 1 / (1 + x) over n pulses, x from -p / 2 to p / 2 (not quite: at the pulses), is nearly 1 + second * p^2 /
  * (1 - fourth * p^2), in 1 / 2^16: all of it for n = 2 and 3, up to p^4 for others. For n = 2 to 8, and roughly for those
  * from 8, 16, 32 and 64 on. */
@@ -222,212 +169,206 @@ static uint32_t series(uint16_t pulses)
     return flash_u32(&series_of[place]);
 }
 
-static uint16_t harmonic_next(ramp_t *ramp, const ramp_constants_t *constants, uint16_t left, wide_t *sum_q16, block_t *group,
-                             uint32_t *third_q16)
+/* The shape of a group of several intervals, from the one at the mean of the velocities of its ends: that, times the part
+ * by which the velocity changes in the group, times it again ... */
+enum { MEAN, SLOPE, CURVE, THIRD, FOURTH, POWERS };
+
+/* mean[MEAN] becomes that of the intervals. */
+static void shape(const ramp_t *ramp, uint32_t *powers_q16, uint16_t pulses)
 {
-    uint32_t first2 = ramp->u.harmonic.next2;
-    uint32_t cap2 = ramp->u.harmonic.cap2;
-    uint32_t step2 = ramp->u.harmonic.step2;
-    uint16_t pulses;
-    if (first2 > cap2) {
-        wide_t interval_q16;
-        divide_k(&interval_q16, constants, cap2);
-        if (!ramp->faster) {
-            uint32_t above = (first2 - cap2) / step2 + 1; /* so many pulses */
-            if (above < left)
-                left = (uint16_t)above;
-        }
-        pulses = flat(ramp, left, &interval_q16, sum_q16);
-        if (!ramp->faster)
-            ramp->u.harmonic.next2 -= step2 * pulses;
-        return pulses;
+    NEAR(ramp);
+    uint32_t rate_q40 = ramp->rate;
+    if (ramp->linear)
+        rate_q40 = wide_fraction(powers_q16[MEAN], rate_q40) << (40 + 16 - LINEAR_RATE_LOG2 - 1);
+    uint32_t part = wide_fraction(powers_q16[MEAN] * pulses, rate_q40) << 8;
+    for (uint8_t i = MEAN; i < FOURTH; i++)
+        powers_q16[i + 1] = wide_fraction(powers_q16[i], part);
+    uint32_t curve = powers_q16[CURVE];
+    powers_q16[CURVE] += curve;
+    if (ramp->linear) {
+        powers_q16[CURVE] += curve;
+        return;
     }
-    pulses = choose_group(ramp, step2, first2 >> part_log2(ramp), left);
-    uint32_t change2 = step2 * pulses;
-    uint32_t to_centre2 = (change2 - step2) >> 1;
-    if (!ramp->faster) {
-        change2 = 0u - change2;
-        to_centre2 = 0u - to_centre2;
-    }
-    ramp->u.harmonic.next2 = first2 + change2;
-    divide_k(sum_q16, constants, first2 + to_centre2);
-    if (pulses > 1) {
-        uint32_t mean = wide_half(sum_q16, 0);
-        uint32_t part = wide_fraction(mean * pulses, ramp->u.harmonic.step_q40) << 8;
-        uint32_t curve = shape(group, third_q16, mean, part);
-        group->curve_q16 = (int32_t)(2 * curve);
-        uint32_t factors = series(pulses);
-        uint32_t term = curve;
-        for (uint8_t terms = ramp->steep > 1 ? 2 : 1; terms; terms--) {
-            term = wide_fraction(wide_fraction(wide_fraction(term, part), part), factors & 0xFFFF0000u);
-            curve += term;
-        }
-        mean += wide_fraction(curve, factors << 16);
-        group->top_q16 = mean;
-        *sum_q16 = mean * pulses;
-    }
-    return pulses;
+    uint32_t factors = series(pulses);
+    uint32_t fourth = factors & 0xFFFF0000u;
+    uint32_t term = wide_fraction(powers_q16[FOURTH], fourth);
+    curve += term;
+    if (ramp->steep > 1)
+        curve += wide_fraction(wide_fraction(wide_fraction(term, part), part), fourth);
+    powers_q16[MEAN] += wide_fraction(curve, factors << 16);
 }
 
-/* -- linear ------------------------------------------------------------------------------------------------------ */
+/* -- the laws ----------------------------------------------------------------------------------------------------- */
 
-void ramp_linear_c(wide_t *c_q8, uint16_t steps_per_rev, uint8_t factor_log2, uint32_t accel_centi)
+/* x * 2^up / divisor, of as many bits as there is room for. */
+static NOINLINE void divide_scaled(wide_t *x, uint32_t divisor, int8_t up)
 {
-    /* 2 * alpha / accel in ticks^2 * 256 = 2 * (2 pi / (sprf * F)) / (centi / 100) * (16e6)^2 * 256
-     *                                    = 8.23549664645790755e19 / (sprf * F * centi); an eighth of it fits 64 bits. */
-    *c_q8 = 10294370808072384000u;
-    wide_divide(c_q8, steps_per_rev);
-    wide_divide(c_q8, accel_centi);
-    for (uint8_t i = 0; i < 3; i++)
-        wide_add(c_q8, c_q8);
-    wide_shift(c_q8, factor_log2);
+    int8_t room = (int8_t)(64 - wide_bits(x));
+    int8_t before = up < room ? up : room;
+    wide_shift(x, (int8_t)-before);
+    wide_divide(x, divisor);
+    wide_shift(x, (int8_t)(before - up));
 }
 
-/* sum +- x */
-static void add_if(wide_t *sum, const wide_t *x, bool add)
+void ramp_square(wide_t *x, uint32_t v)
 {
-    if (add)
-        wide_add(sum, x);
-    else
-        wide_subtract(sum, x);
+    wide_t wide_v = v;
+    wide_multiply(x, &wide_v, &wide_v);
 }
 
-/* Units as fine as they can be: t below 2^30, and still below 2^31 after the next group. */
+/* Linear: velocity units so many times twice as large, or half as large (below 0). K gets what it has room for. */
+static NOINLINE void scale_k(ramp_t *ramp, int8_t by)
+{
+    NEAR(ramp);
+    int8_t up = (int8_t)(ramp->k_lacks - by);
+    int8_t room = (int8_t)(64 - wide_bits(&ramp->k2_q16));
+    ramp->k_lacks = 0;
+    if (up > room) {
+        ramp->k_lacks = (uint8_t)(up - room);
+        up = room;
+    }
+    wide_shift(&ramp->k2_q16, (int8_t)-up);
+}
+
+/* As fine as they can be. */
 static NOINLINE void choose_units(ramp_t *ramp)
 {
     NEAR(ramp);
-    wide_t *x = &ramp->u.linear.x;
-    wide_t *c = &ramp->u.linear.c;
-    for (;;) {
-        uint8_t bits = wide_bits(x);
-        if (bits > 60) {
-            wide_shift(x, 2);
-            wide_shift(c, 2);
-            ramp->u.linear.halved++;
-        } else if (bits < 58 && ramp->u.linear.halved) {
-            for (uint8_t i = 0; i < 2; i++) {
-                wide_add(x, x);
-                wide_add(c, c);
-            }
-            ramp->u.linear.halved--;
-        } else {
-            return;
-        }
-        ramp->u.linear.t = wide_root(x);
-    }
+    uint8_t bits = wide_bits(&ramp->x);
+    uint8_t bits_of_c = wide_bits(&ramp->c);
+    if (bits < bits_of_c)
+        bits = bits_of_c;
+    int8_t by = (int8_t)((int8_t)(bits - 59) / 2);
+    if (by == 0)
+        return;
+    scale_k(ramp, by);
+    by = (int8_t)(2 * by);
+    wide_shift(&ramp->x, by);
+    wide_shift(&ramp->c, by);
+    ramp->v = wide_root(&ramp->x);
 }
 
-/* Takes the ramp so many squares of time further, or back: by 1/16 ticks, modulo 2^32. */
-static NOINLINE uint32_t advance(ramp_t *ramp, const wide_t *squares, bool forward)
+static void begin_linear(ramp_t *ramp, const ramp_constants_t *constants, uint32_t k_by_128, uint32_t v_most,
+                         uint32_t pulses)
+{
+    wide_t *c = &ramp->c;
+    wide_t *x = &ramp->x;
+    uint8_t scale = 0;
+    while (v_most >> 29 == 0) {
+        v_most <<= 1;
+        ramp->v <<= 1;
+        scale++;
+    }
+    scale_k(ramp, (int8_t)-scale);
+    if (ramp->step) {
+        *c = ramp->step;
+        ramp_multiply(c, LINEAR_SQUARE_Q15);
+        divide_scaled(c, constants->steps_per_rev, (int8_t)(2 * scale - 15));
+    } else {
+        ramp_square(c, v_most);
+        wide_divide(c, pulses);
+    }
+    wide_t rate;
+    wide_copy(&rate, c);
+    divide_scaled(&rate, k_by_128, (int8_t)(LINEAR_RATE_LOG2 - 14u - 2u * scale));
+    wide_divide(&rate, k_by_128);
+    ramp->rate = wide_half(&rate, 0);
+    ramp->steep = (uint8_t)((ramp->rate >> LINEAR_STEEP_LOG2 != 0) + (ramp->rate >> (LINEAR_STEEP_LOG2 - 6) != 0));
+    ramp_square(x, ramp->v);
+    if (ramp->v == 0 && !ramp->faster) {
+        wide_t n = pulses;
+        wide_multiply(x, &n, c); /* exactly to a standstill */
+        ramp->v = wide_root(x);
+    }
+    choose_units(ramp);
+}
+
+/* 2 K / v2 */
+static NOINLINE void set_interval(ramp_t *ramp, wide_t *interval_q16, uint32_t v2)
 {
     NEAR(ramp);
-    uint8_t halved = ramp->u.linear.halved;
-    uint32_t before = ramp->u.linear.t;
-    bool faster = ramp->faster == forward;
-    add_if(&ramp->u.linear.x, squares, faster);
-    uint32_t after = wide_root(&ramp->u.linear.x);
-    ramp->u.linear.t = after;
-    if (halved == 0)
-        return faster ? after - before : before - after;
-    /* Units are coarser than that: what x changes by, over the sum of both times. */
-    wide_t change;
-    wide_copy(&change, squares);
-    do
-        wide_add(&change, &change);
-    while (--halved);
-    wide_t rest = ramp->u.linear.rest;
-    wide_add(&change, &rest);
-    ramp->u.linear.rest = wide_divide(&change, before + after + 1); /* roots are rounded down */
-    return (uint32_t)change;
+    divide_k(interval_q16, &ramp->k2_q16, v2);
+    wide_shift(interval_q16, (int8_t)-ramp->k_lacks);
+    set_ticks(ramp, interval_q16);
 }
 
-/* From 1/16. */
-static NOINLINE void set_q4(wide_t *ticks_q16, uint32_t ticks_q4)
+NOINLINE void ramp_begin(ramp_t *ramp, const ramp_constants_t *constants, uint32_t v_most, uint32_t pulses)
 {
-    *ticks_q16 = (wide_t)ticks_q4 << 16;
-    wide_shift(ticks_q16, 4);
-}
-
-void ramp_begin_linear(ramp_t *ramp, const wide_t *c_q8, const wide_t *t_q4, uint32_t pulses, bool faster,
-                       ramp_time_t bound)
-{
-    begin(ramp, true, faster);
-    ramp->u.linear.bound_q16 = (wide_t)bound.ticks << 16 | bound.frac_q16;
-    wide_t *x = &ramp->u.linear.x;
-    wide_t *c = &ramp->u.linear.c;
-    wide_t n = pulses;
-    wide_t t;
-    wide_copy(&t, t_q4);
-    wide_copy(c, c_q8);
-    uint8_t bits_of_c = wide_bits(c);
-    uint8_t bits = (uint8_t)(2 * wide_bits(&t));
-    bool standstill = bits == 0;
-    if (standstill && !faster)
-        bits = (uint8_t)(bits_of_c + wide_bits(&n));
-    uint8_t halved = bits > 62 ? (uint8_t)(bits - 61) / 2 : 0; /* x needs 64 bits at most */
-    ramp->u.linear.halved = halved;
-    wide_shift(c, (uint8_t)(2 * halved));
-    wide_shift(&t, halved);
-    if (!standstill)
-        wide_multiply(x, &t, &t);
-    else if (!faster)
-        wide_multiply(x, &n, c); /* exactly to it */
-    ramp->u.linear.t = wide_root(x);
-    choose_units(ramp);
-    ramp->steep = bits_of_c <= STEEP_BITS ? 2 : bits_of_c <= STEEP_BITS + 6;
-    /* The first interval, to choose the first group's size. */
-    wide_t interval_q16;
-    set_q4(&interval_q16, advance(ramp, c, true));
-    set_ticks(ramp, &interval_q16);
-    advance(ramp, c, false);
-}
-
-static uint16_t linear_next(ramp_t *ramp, uint16_t left, wide_t *sum_q16, block_t *group,
-                             uint32_t *third_q16)
-{
-    const wide_t *bound_q16 = &ramp->u.linear.bound_q16;
-    if (ramp->u.linear.bounded)
-        return flat(ramp, left, bound_q16, sum_q16);
-    bool faster = ramp->faster;
-    for (;;) {
-        choose_units(ramp);
-        uint32_t begin = ramp->u.linear.t;
-        uint8_t halved = ramp->u.linear.halved;
-        uint16_t pulses = choose_group(ramp, (uint32_t)ramp->ticks >> halved, begin >> 4 >> part_log2(ramp), left);
-        wide_t change;
-        wide_copy(&change, &ramp->u.linear.c);
-        ramp_multiply(&change, pulses);
-        uint32_t ticks_q4 = advance(ramp, &change, true);
-        set_q4(sum_q16, ticks_q4);
-        wide_t last_q16;
-        wide_copy(&last_q16, sum_q16);
-        if (pulses > 1) {
-            uint32_t mean = wide_half(sum_q16, 0);
-            mean = pulses & (pulses - 1u) ? mean / pulses : mean >> floor_log2(pulses);
-            group->curve_q16 = (int32_t)(3 * shape(group, third_q16, mean, ratio_q32(ticks_q4, halved, (begin + ramp->u.linear.t) >> 1)));
-            group->top_q16 = mean;
-            uint32_t half = (uint32_t)group->slope_q16 >> 1;
-            last_q16 = faster ? mean - half : mean + half;
-        }
-        wide_subtract(&last_q16, bound_q16);
-        if (wide_is_negative(&last_q16) != faster)
-            return pulses;
-        /* The bound is reached in it: less. */
-        if (pulses == 1)
-            break;
-        ramp->most_log2 = (uint8_t)(ramp->group_log2 - 1);
-        advance(ramp, &change, false);
+    ramp->rest = false;
+    ramp->bounded = false;
+    ramp->run_pulses = 0;
+    ramp->k_lacks = 0;
+    ramp->group_log2 = ramp->most_log2 = GROUP_MAX_LOG2;
+    wide_copy(&ramp->k2_q16, &constants->k2_q16);
+    uint32_t k_by_128 = (uint32_t)wide_from_byte(&constants->k2_q16, 3);
+    uint32_t first2;
+    if (ramp->linear) {
+        begin_linear(ramp, constants, k_by_128, v_most, pulses);
+        first2 = ramp->v ? 2 * ramp->v : wide_root(&ramp->c);
+    } else {
+        uint32_t step = ramp->step;
+        uint32_t steep = k_by_128 >> 10; /* K / 2^17; a third: 2^18.6 */
+        ramp->steep = (uint8_t)((step > steep) + (3 * step > steep));
+        ramp->rate = step < k_by_128 >> 1 ? ratio_q32(2 * step, k_by_128) : UINT32_MAX;
+        first2 = 2 * (ramp->v < ramp->limit.cap ? ramp->v : ramp->limit.cap);
     }
-    ramp->u.linear.bounded = true;
-    ramp->most_log2 = GROUP_MAX_LOG2;
-    wide_copy(sum_q16, bound_q16);
-    return 1;
+    wide_t interval_q16;
+    set_interval(ramp, &interval_q16, first2);
+}
+
+/* The next group of a law: its pulses, and the interval at the mean of the velocities at both ends. */
+
+static uint16_t harmonic_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16)
+{
+    uint32_t v2 = 2 * ramp->v;
+    uint32_t step = ramp->step;
+    uint32_t cap2 = 2 * ramp->limit.cap;
+    uint16_t pulses;
+    ramp->bounded = v2 > cap2;
+    if (ramp->bounded) {
+        uint32_t above = (ramp->v - ramp->limit.cap) / step + 1; /* so many pulses */
+        if (above < left)
+            left = (uint16_t)above;
+        pulses = choose_group(ramp, 0, 0, left);
+        v2 = cap2;
+    } else {
+        pulses = choose_group(ramp, step, ramp->v >> part_log2(ramp), left);
+    }
+    uint32_t change = step * pulses;
+    if (!ramp->faster) {
+        change = 0u - change;
+        step = 0u - step;
+    }
+    ramp->v += change;
+    if (!ramp->bounded)
+        v2 += change - step;
+    set_interval(ramp, interval_q16, v2);
+    return pulses;
+}
+
+/* At its end: *v_end, *x_end */
+static uint16_t linear_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16, uint32_t *v_end, wide_t *x_end)
+{
+    choose_units(ramp);
+    uint16_t pulses =
+        choose_group(ramp, wide_half(&ramp->c, 1), wide_half(&ramp->x, 1) >> (part_log2(ramp) - 1), left);
+    wide_t change;
+    wide_copy(&change, &ramp->c);
+    ramp_multiply(&change, pulses);
+    wide_copy(x_end, &ramp->x);
+    if (ramp->faster)
+        wide_add(x_end, &change);
+    else
+        wide_subtract(x_end, &change);
+    *v_end = wide_is_negative(x_end) ? 0 : wide_root(x_end);
+    set_interval(ramp, interval_q16, ramp->v + *v_end + 1); /* roots are rounded down */
+    return pulses;
 }
 
 /* -- both -------------------------------------------------------------------------------------------------------- */
 
 /* Divides a group, given by its mean and the law's derivatives in its middle, into runs. */
-static void divide(ramp_t *ramp, uint16_t pulses, block_t *group, uint32_t third_q16)
+static void divide(ramp_t *ramp, uint16_t pulses, block_t *group, const uint32_t *powers_q16)
 {
     uint8_t run = 1;
     uint16_t runs = pulses;
@@ -436,8 +377,8 @@ static void divide(ramp_t *ramp, uint16_t pulses, block_t *group, uint32_t third
         run = (uint8_t)(run << 1);
     }
     uint8_t odd = (uint8_t)runs;
-    uint32_t slope = (uint32_t)group->slope_q16;
-    uint32_t curve = (uint32_t)group->curve_q16;
+    uint32_t slope = powers_q16[SLOPE];
+    uint32_t curve = powers_q16[CURVE];
     /* How many pulses may share one or two timer values. */
     uint16_t ticks = ramp->ticks;
     uint8_t halvings = 0;
@@ -461,9 +402,9 @@ static void divide(ramp_t *ramp, uint16_t pulses, block_t *group, uint32_t third
     group->runs = odd;
     /* The cubic part: so that two and four runs are right, and of more all nearly. */
     uint8_t cubic_q8 = odd == 2 ? 16 : odd == 4 ? 36 : 48;
-    slope += wide_fraction(third_q16, (uint32_t)cubic_q8 << 24);
+    slope += wide_fraction(powers_q16[THIRD], (uint32_t)cubic_q8 << 24);
     if (runs > 1) {
-        uint32_t part = ratio_q32(1, 0, runs);
+        uint32_t part = ratio_q32(1, runs);
         slope = wide_fraction(slope, part);
         curve = wide_fraction(wide_fraction(curve, part), part);
     }
@@ -477,25 +418,62 @@ static void divide(ramp_t *ramp, uint16_t pulses, block_t *group, uint32_t third
     slope -= (uint32_t)((int32_t)bend >> 1);
     group->slope_q16 = (int32_t)slope;
     group->curve_q16 = (int32_t)curve;
-    group->top_q16 -= 65536u + wide_fraction(bend * steps, 715827883u) + (uint32_t)((int32_t)(slope * steps) >> 1); /* 2^32 / 6 */
+    group->top_q16 = powers_q16[MEAN] - 65536u - wide_fraction(bend * steps, 715827883u) - (uint32_t)((int32_t)(slope * steps) >> 1); /* 2^32 / 6 */
 }
 
-uint16_t ramp_next(ramp_t *ramp, const ramp_constants_t *constants, uint32_t left, ramp_time_t *sum, block_t *group)
+uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *group)
 {
-    wide_t sum_q16;
-    uint32_t third_q16;
-    group->runs = 0;
     uint16_t few = left > 4u << GROUP_MAX_LOG2 ? 4u << GROUP_MAX_LOG2 : (uint16_t)left;
-    uint16_t pulses = ramp->linear ? linear_next(ramp, few, &sum_q16, group, &third_q16) : harmonic_next(ramp, constants, few, &sum_q16, group, &third_q16);
-    set_time(sum, &sum_q16);
-    bool shaped = group->runs != 0;
+    uint16_t pulses;
+    wide_t sum_q16;
+    uint32_t powers_q16[POWERS];
+    bool fits;
+    do {
+        uint32_t v_end;
+        wide_t x_end;
+        bool goes_on = ramp->linear && !ramp->bounded;
+        if (goes_on) {
+            pulses = linear_next(ramp, few, &sum_q16, &v_end, &x_end);
+        } else if (!ramp->linear) {
+            pulses = harmonic_next(ramp, few, &sum_q16);
+        } else {
+            wide_copy(&sum_q16, &ramp->limit.bound_q16);
+            set_ticks(ramp, &sum_q16);
+            pulses = choose_group(ramp, 0, 0, few);
+        }
+        wide_t last_q16;
+        wide_copy(&last_q16, &sum_q16);
+        if (pulses > 1) {
+            powers_q16[MEAN] = wide_half(&sum_q16, 0);
+            if (!ramp->bounded) {
+                shape(ramp, powers_q16, pulses);
+                uint32_t half = powers_q16[SLOPE] >> 1;
+                last_q16 = ramp->faster ? powers_q16[MEAN] - half : powers_q16[MEAN] + half;
+            }
+            sum_q16 = powers_q16[MEAN] * pulses;
+        }
+        fits = true;
+        if (goes_on) {
+            wide_subtract(&last_q16, &ramp->limit.bound_q16);
+            fits = wide_is_negative(&last_q16) != ramp->faster;
+            if (fits) {
+                wide_copy(&ramp->x, &x_end);
+                ramp->v = v_end;
+            } else if (pulses > 1) {
+                ramp->most_log2 = (uint8_t)(ramp->group_log2 - 1);
+            } else {
+                /* All that is left: equal intervals, from this one on. */
+                ramp->most_log2 = GROUP_MAX_LOG2;
+                ramp->bounded = true;
+                few = 1;
+            }
+        }
+    } while (!fits);
     group->runs = 0;
-    if (pulses == 1) {
-        set_ticks(ramp, &sum_q16);
-    } else if (shaped) {
-        ramp->ticks = (uint16_t)(group->top_q16 >> 16);
-        if (!ramp->rest && (ramp->ticks >= BLOCK_SPLIT_TICKS || pulses >= 8))
-            divide(ramp, pulses, group, third_q16);
-    }
+    if (ramp->bounded)
+        ramp->rest = false;
+    else if (pulses > 1 && !ramp->rest && (ramp->ticks >= BLOCK_SPLIT_TICKS || pulses >= 8))
+        divide(ramp, pulses, group, powers_q16);
+    set_time(sum, &sum_q16);
     return pulses;
 }

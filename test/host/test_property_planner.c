@@ -272,7 +272,7 @@ static bool group_is_right(watch_t *w, const char *phase, uint16_t pulses, const
     return true;
 }
 
-static bool ramp_is_right(const trial_t *t, const profile_basis_t *basis, const char *phase, ramp_t *ramp,
+static bool ramp_is_right(const trial_t *t, const char *phase, ramp_t *ramp,
                           uint32_t pulses, const exact_ramp_t *law, bool faster, long double shortest,
                           long double longest)
 {
@@ -280,7 +280,7 @@ static bool ramp_is_right(const trial_t *t, const profile_basis_t *basis, const 
     while (pulses) {
         ramp_time_t sum;
         block_t block;
-        uint16_t group = ramp_next(ramp, &basis->ramp, pulses, &sum, &block);
+        uint16_t group = ramp_next(ramp, pulses, &sum, &block);
         if (group == 0 || group > pulses) {
             FAIL(t, "%s: group of %u, %u left", phase, group, pulses);
             return false;
@@ -342,8 +342,8 @@ static void check_planned(const trial_t *t)
         long double longest = fmaxl(in_play, is_linear(t) ? cruise : exact_interval_ticks(&t->motor, rpm));
         if (is_linear(t) && rest)
             longest = fmaxl(longest, law.c0); /* the linear start */
-        profile_begin_accel(&p, &basis, &ramp);
-        if (!ramp_is_right(t, &basis, "accel", &ramp, p.accel_pulses, &law, faster, fminl(cruise, in_play), longest))
+        profile_begin_ramp(&p, &basis, true, &ramp);
+        if (!ramp_is_right(t, "accel", &ramp, p.accel_pulses, &law, faster, fminl(cruise, in_play), longest))
             return;
     }
     if (p.decel_pulses) {
@@ -355,8 +355,8 @@ static void check_planned(const trial_t *t)
             peak = rpm > t->in_play_rpm ? fminl(rpm, t->in_play_rpm + change) : fmaxl(rpm, t->in_play_rpm - change);
         }
         exact_decel(&law, &t->motor, p.decel_pulses, peak, accel_centi(c->decel), is_linear(t));
-        profile_begin_decel(&p, &basis, &ramp);
-        if (!ramp_is_right(t, &basis, "decel", &ramp, p.decel_pulses, known, false, fminl(cruise, in_play), slow))
+        profile_begin_ramp(&p, &basis, false, &ramp);
+        if (!ramp_is_right(t, "decel", &ramp, p.decel_pulses, known, false, fminl(cruise, in_play), slow))
             return;
     }
 }
