@@ -124,11 +124,11 @@ static uint8_t direction_flags(const motion_command_t *c, bool turn)
 void engine_init(void)
 {
     profile_basis(&basis, settings.steps_per_rev, drivers_ustep(settings.driver_id, settings.ustep),
-                  settings.slow_rpm);
+                  settings.slow_rpm, settings.internal_clock ? TICKS_PER_US * 1000000u : settings.xclk_hz);
     engine.v_in_play = basis.v_slow;
     engine.in_play_cycle_us = 0;
     engine.gap_off = false;
-    certain_centi = (130000000u >> basis.factor_log2) / basis.steps_per_rev;
+    certain_centi = (130000000u >> basis.factor_log2) / basis.ramp.steps_per_rev;
     engine.width_ticks = (uint16_t)settings.pulse_us * TICKS_PER_US;
     step_port_init();
 }
@@ -774,7 +774,7 @@ static uint16_t certain_ticks(void)
         least_rpm = (uint16_t)(settings.slow_rpm + 2u + (uint16_t)(accel >> 6));
         if (basis.slow_ticks < AHEAD_LONG_TICKS + SHORTEST_PIECE_TICKS)
             ahead = AHEAD_TICKS / AHEAD_PERIODS;
-    } else if (basis.steps_per_rev < 200 || accel > certain_centi || command.accel > command.decel) {
+    } else if (basis.ramp.steps_per_rev < 200 || accel > certain_centi || command.accel > command.decel) {
         /* c0 = sqrt(3.217e17 / (sprf * F * centi)) ticks is long enough; at least one step from 100 RPM on with 200 steps
          * and more, and no less of acceleration than of deceleration in a truncated profile. */
         return 0;

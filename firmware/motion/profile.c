@@ -5,12 +5,12 @@
 
 #define NO_RAMP_CENTI 99900u /* of ACCEL_NONE */
 
-void profile_basis(profile_basis_t *basis, uint16_t steps_per_rev, uint8_t factor_log2, uint8_t slow_rpm)
+void profile_basis(profile_basis_t *basis, uint16_t steps_per_rev, uint8_t factor_log2, uint8_t slow_rpm,
+                   uint32_t clock_hz)
 {
     NEAR(basis);
-    ramp_constants(&basis->ramp, steps_per_rev);
+    ramp_constants(&basis->ramp, steps_per_rev, clock_hz);
     basis->us_rpm = (uint32_t)60000000 / steps_per_rev;
-    basis->steps_per_rev = steps_per_rev;
     basis->factor_log2 = factor_log2;
     basis->v_slow = (uint32_t)slow_rpm * 100u << factor_log2;
     ramp_time_t slow = ramp_interval(&basis->ramp, basis->v_slow);
@@ -21,7 +21,6 @@ void profile_basis(profile_basis_t *basis, uint16_t steps_per_rev, uint8_t facto
 static NOINLINE uint32_t inverse(const profile_basis_t *basis, const motion_command_t *command)
 {
     NEAR(command);
-    NEAR(basis);
     return basis->us_rpm / command->velocity;
 }
 
@@ -35,11 +34,32 @@ uint32_t profile_cycle_us(const profile_basis_t *basis, const motion_command_t *
     return command->flags & MOTION_CYCLE ? command->velocity : inverse(basis, command);
 }
 
+NOINLINE void profile_interval(const profile_basis_t *basis, uint32_t us, uint8_t halvings, profile_interval_t *interval)
+{
+    NEAR(interval);
+    if (basis->ramp.cycles_log2 == 0) { /* 16 ticks a microsecond */
+        uint8_t chunk_us_log2 = (uint8_t)(PROFILE_CHUNK_LOG2 - 4 + halvings);
+        interval->chunks = us >> chunk_us_log2;
+        interval->ticks_q8 = ((us & (((uint32_t)1 << chunk_us_log2) - 1)) << 12) >> halvings;
+        return;
+    }
+    wide_t ticks_q9 = us;
+    ramp_multiply(&ticks_q9, basis->ramp.clock_hz);
+    wide_shift(&ticks_q9, -8);
+    wide_divide(&ticks_q9, 1000000);
+    wide_shift(&ticks_q9, (int8_t)(halvings - 1));
+    interval->chunks = (uint32_t)wide_from_byte(&ticks_q9, 3);
+    interval->ticks_q8 = (wide_half(&ticks_q9, 0) & 0xFFFFFFu) >> 1;
+}
+
 status_t profile_check(const profile_basis_t *basis, const motion_command_t *command, uint8_t pulse_us)
 {
     if (command->velocity == 0)
         return STATUS_VELOCITY_ZERO;
-    uint32_t shortest_us = (uint32_t)(pulse_us > 1 ? pulse_us + 1u : 2u) << basis->factor_log2;
+    uint32_t shortest_us = pulse_us > 1 ? pulse_us + 1u : 2u;
+    if (basis->ramp.cycles_log2)
+        shortest_us = pulse_us > 2 ? pulse_us + 6u : 8u; /* two ticks, and time for the interrupt */
+    shortest_us <<= basis->factor_log2;
     if (command->flags & MOTION_CYCLE) {
         if (command->velocity < shortest_us)
             return STATUS_PERIOD_TOO_SHORT;
@@ -60,7 +80,7 @@ status_t profile_check(const profile_basis_t *basis, const motion_command_t *com
 static void linear_steps(wide_t *steps, const profile_basis_t *basis, uint32_t v, uint32_t centi)
 {
     ramp_square(steps, v >> basis->factor_log2);
-    ramp_multiply(steps, basis->steps_per_rev * (uint32_t)9);
+    ramp_multiply(steps, basis->ramp.steps_per_rev * (uint32_t)9);
     wide_divide(steps, 1031324);
     wide_divide(steps, centi);
 }
@@ -106,7 +126,7 @@ static void add_change(wide_t *v2, const profile_basis_t *basis, uint32_t pulses
     wide_t change = pulses;
     ramp_multiply(&change, centi << basis->factor_log2);
     ramp_multiply(&change, 916732); /* 8 * 114591.559 to 5 parts in 10^7 */
-    wide_divide(&change, basis->steps_per_rev);
+    wide_divide(&change, basis->ramp.steps_per_rev);
     wide_shift(&change, 3);
     if (add)
         wide_add(v2, &change);
@@ -220,10 +240,7 @@ NOINLINE void profile_plan(profile_t *profile, const profile_basis_t *basis, con
     uint8_t factor_log2 = basis->factor_log2;
     uint32_t cycle_us = profile_cycle_us(basis, command);
     profile->cycle_us = cycle_us;
-    /* Of a full step, divided by the microsteps; 16 ticks a microsecond. */
-    uint8_t chunk_us_log2 = (uint8_t)(PROFILE_CHUNK_LOG2 - 4 + factor_log2);
-    profile->cruise.chunks = cycle_us >> chunk_us_log2;
-    profile->cruise.ticks_q8 = ((cycle_us & (((uint32_t)1 << chunk_us_log2) - 1)) << 12) >> factor_log2;
+    profile_interval(basis, cycle_us, factor_log2, &profile->cruise); /* of a full step, divided by the microsteps */
 
     /* Velocities above the range of units are refused by profile_check: a period of 2 us is far below it. */
     uint32_t v_target = profile_rpm(basis, command) * 100u << factor_log2;
@@ -275,7 +292,6 @@ NOINLINE void profile_plan(profile_t *profile, const profile_basis_t *basis, con
 
 void profile_plan_decel(profile_t *profile, const profile_basis_t *basis, uint32_t v, accel_code_t decel, bool linear)
 {
-    NEAR(basis);
     begin_plan(profile, decel, linear, v);
     wide_t steps;
     ramp_steps(&steps, basis, profile, basis->v_slow, profile->decel_centi);
@@ -286,7 +302,6 @@ void profile_plan_decel(profile_t *profile, const profile_basis_t *basis, uint32
 
 void profile_begin_ramp(const profile_t *profile, const profile_basis_t *basis, bool accel, ramp_t *ramp)
 {
-    NEAR(profile);
     NEAR(basis);
     NEAR(ramp);
     uint32_t n = profile->decel_pulses;

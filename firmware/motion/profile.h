@@ -48,11 +48,14 @@ typedef struct {
     uint32_t us_rpm;     /* microseconds * RPM per full step: 60e6 / steps per revolution */
     uint32_t v_slow;     /* slow speed in units */
     uint32_t slow_ticks; /* its interval, rounded up */
-    uint16_t steps_per_rev;
     uint8_t factor_log2; /* microsteps per full step */
 } profile_basis_t;
 
-void profile_basis(profile_basis_t *basis, uint16_t steps_per_rev, uint8_t factor_log2, uint8_t slow_rpm);
+void profile_basis(profile_basis_t *basis, uint16_t steps_per_rev, uint8_t factor_log2, uint8_t slow_rpm,
+                   uint32_t clock_hz);
+
+/* Microseconds, divided by a power of two, in ticks. */
+void profile_interval(const profile_basis_t *basis, uint32_t us, uint8_t halvings, profile_interval_t *interval);
 
 /* Velocity arithmetic of the manual: integer RPM from a cycle and integer cycle from RPM, truncated. */
 uint32_t profile_rpm(const profile_basis_t *basis, const motion_command_t *command);

@@ -21,15 +21,22 @@
 #define LINEAR_RATE_LOG2 48u
 #define LINEAR_STEEP_LOG2 (LINEAR_RATE_LOG2 + 2u - 28u) /* first intervals below 2^14 ticks: 4 K^2 / c below 2^28 */
 /* Runs: the interrupt's cycles for two segments, the planner's, and as much for others; and those of each pulse. */
-#define RUN_TICKS 500u
-#define RUN_PULSE_TICKS 24u
+#define RUN_CYCLES 500u
+#define RUN_PULSE_CYCLES 24u
 #define RUN_SLOPE_Q8 496u /* change of the interval within a run */
 
-void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev)
+void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev, uint32_t clock_hz)
 {
     constants->steps_per_rev = steps_per_rev;
-    constants->k2_q16 = 96000000000u * 131072u;
+    constants->clock_hz = clock_hz;
+    constants->k2_q16 = clock_hz;
+    ramp_multiply(&constants->k2_q16, 6000u * 131072u);
     wide_divide(&constants->k2_q16, steps_per_rev);
+    uint8_t log2 = 0;
+    for (uint8_t mhz_q4 = (uint8_t)(clock_hz >> 16); mhz_q4 < 128; mhz_q4 = (uint8_t)(mhz_q4 << 1))
+        log2++;
+    constants->cycles_log2 = log2;
+    constants->split_ticks = log2 ? 0 : BLOCK_SPLIT_TICKS;
 }
 
 void ramp_multiply(wide_t *x, uint32_t factor)
@@ -63,7 +70,6 @@ static void set_time(ramp_time_t *time, const wide_t *q16)
 
 ramp_time_t ramp_interval(const ramp_constants_t *constants, uint32_t v)
 {
-    NEAR(constants);
     wide_t q16;
     divide_k(&q16, &constants->k2_q16, 2 * v);
     ramp_time_t time;
@@ -107,9 +113,10 @@ static NOINLINE uint8_t part_log2(const ramp_t *ramp)
  * where fewer are left, so many whole runs as before. Down from twice the last group's size, which is nearly always enough. */
 static NOINLINE uint16_t choose_group(ramp_t *ramp, uint32_t change, uint32_t most_change, uint16_t left)
 {
+    NEAR(ramp);
     uint16_t ticks = ramp->ticks;
     ramp->rest = false;
-    if (ticks < BLOCK_SPLIT_TICKS) {
+    if (ticks < ramp->split_ticks) {
         /* Where a few pulses could not be reloaded in time, the last run is of many. */
         if (left < 2 * REST_PULSES)
             ramp->rest = true;
@@ -176,7 +183,6 @@ enum { MEAN, SLOPE, CURVE, THIRD, FOURTH, POWERS };
 /* mean[MEAN] becomes that of the intervals. */
 static void shape(const ramp_t *ramp, uint32_t *powers_q16, uint16_t pulses)
 {
-    NEAR(ramp);
     uint32_t rate_q40 = ramp->rate;
     if (ramp->linear)
         rate_q40 = wide_fraction(powers_q16[MEAN], rate_q40) << (40 + 16 - LINEAR_RATE_LOG2 - 1);
@@ -251,6 +257,7 @@ static NOINLINE void choose_units(ramp_t *ramp)
 static void begin_linear(ramp_t *ramp, const ramp_constants_t *constants, uint32_t k_by_128, uint32_t v_most,
                          uint32_t pulses)
 {
+    NEAR(ramp);
     wide_t *c = &ramp->c;
     wide_t *x = &ramp->x;
     uint8_t scale = 0;
@@ -273,7 +280,8 @@ static void begin_linear(ramp_t *ramp, const ramp_constants_t *constants, uint32
     divide_scaled(&rate, k_by_128, (int8_t)(LINEAR_RATE_LOG2 - 14u - 2u * scale));
     wide_divide(&rate, k_by_128);
     ramp->rate = wide_half(&rate, 0);
-    ramp->steep = (uint8_t)((ramp->rate >> LINEAR_STEEP_LOG2 != 0) + (ramp->rate >> (LINEAR_STEEP_LOG2 - 6) != 0));
+    uint32_t steep = ramp->rate >> (LINEAR_STEEP_LOG2 - 6u + 2u * ramp->cycles_log2);
+    ramp->steep = (uint8_t)((steep != 0) + (steep >> 6 != 0));
     ramp_square(x, ramp->v);
     if (ramp->v == 0 && !ramp->faster) {
         wide_t n = pulses;
@@ -298,6 +306,8 @@ NOINLINE void ramp_begin(ramp_t *ramp, const ramp_constants_t *constants, uint32
     ramp->bounded = false;
     ramp->run_pulses = 0;
     ramp->k_lacks = 0;
+    ramp->cycles_log2 = constants->cycles_log2;
+    ramp->split_ticks = constants->split_ticks;
     ramp->group_log2 = ramp->most_log2 = GROUP_MAX_LOG2;
     wide_copy(&ramp->k2_q16, &constants->k2_q16);
     uint32_t k_by_128 = (uint32_t)wide_from_byte(&constants->k2_q16, 3);
@@ -307,7 +317,7 @@ NOINLINE void ramp_begin(ramp_t *ramp, const ramp_constants_t *constants, uint32
         first2 = ramp->v ? 2 * ramp->v : wide_root(&ramp->c);
     } else {
         uint32_t step = ramp->step;
-        uint32_t steep = k_by_128 >> 10; /* K / 2^17; a third: 2^18.6 */
+        uint32_t steep = (k_by_128 << ramp->cycles_log2) >> 10; /* K / 2^17; a third: 2^18.6 */
         ramp->steep = (uint8_t)((step > steep) + (3 * step > steep));
         ramp->rate = step < k_by_128 >> 1 ? ratio_q32(2 * step, k_by_128) : UINT32_MAX;
         first2 = 2 * (ramp->v < ramp->limit.cap ? ramp->v : ramp->limit.cap);
@@ -349,6 +359,7 @@ static uint16_t harmonic_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16)
 /* At its end: *v_end, *x_end */
 static uint16_t linear_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16, uint32_t *v_end, wide_t *x_end)
 {
+    NEAR(v_end);
     choose_units(ramp);
     uint16_t pulses =
         choose_group(ramp, wide_half(&ramp->c, 1), wide_half(&ramp->x, 1) >> (part_log2(ramp) - 1), left);
@@ -382,11 +393,12 @@ static void divide(ramp_t *ramp, uint16_t pulses, block_t *group, const uint32_t
     /* How many pulses may share one or two timer values. */
     uint16_t ticks = ramp->ticks;
     uint8_t halvings = 0;
-    if (ticks > RUN_PULSE_TICKS) {
+    uint8_t run_pulse_ticks = (uint8_t)(RUN_PULSE_CYCLES >> ramp->cycles_log2);
+    if (ticks > run_pulse_ticks) {
         uint16_t slope_q8 = slope < 1UL << 24 ? (uint16_t)(slope >> 8) : UINT16_MAX;
-        uint16_t span = (uint16_t)((ticks - RUN_PULSE_TICKS) * run);
-        uint16_t least = (uint16_t)(2 * RUN_TICKS + 2 * RUN_TICKS * ramp->steep);
-        uint16_t most = ticks < BLOCK_SPLIT_TICKS ? RUN_SLOPE_Q8 / 4 : RUN_SLOPE_Q8;
+        uint16_t span = (uint16_t)((ticks - run_pulse_ticks) * run);
+        uint16_t least = (uint16_t)((uint16_t)(2 * RUN_CYCLES + 2 * RUN_CYCLES * ramp->steep) >> ramp->cycles_log2);
+        uint16_t most = ticks < ramp->split_ticks ? RUN_SLOPE_Q8 / 4 : RUN_SLOPE_Q8;
         if (odd > 1)
             slope_q8 = (uint16_t)(slope_q8 / odd);
         while (run > 1 && slope_q8 > most && span >= least) {
@@ -423,6 +435,7 @@ static void divide(ramp_t *ramp, uint16_t pulses, block_t *group, const uint32_t
 
 uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *group)
 {
+    NEAR(sum);
     uint16_t few = left > 4u << GROUP_MAX_LOG2 ? 4u << GROUP_MAX_LOG2 : (uint16_t)left;
     uint16_t pulses;
     wide_t sum_q16;
@@ -472,7 +485,7 @@ uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *group
     group->runs = 0;
     if (ramp->bounded)
         ramp->rest = false;
-    else if (pulses > 1 && !ramp->rest && (ramp->ticks >= BLOCK_SPLIT_TICKS || pulses >= 8))
+    else if (pulses > 1 && !ramp->rest && (ramp->ticks >= ramp->split_ticks || pulses >= 8))
         divide(ramp, pulses, group, powers_q16);
     set_time(sum, &sum_q16);
     return pulses;

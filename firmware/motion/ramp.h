@@ -5,7 +5,7 @@
  *          those of the law, so a ramp has no drift.
  * Laws:    harmonic: interval = K / v, v changing by a constant amount per pulse (manual lines 77-89);
  *          linear: v^2 changing by a constant amount per pulse (constant acceleration; manual lines 101-115, 265).
- * Units:   ticks of 62.5 ns with a fraction in 1/65536. Velocities in "units" = RPM * 100 * microstep factor, so that a
+ * Units:   ticks of the timer's clock (62.5 ns, or the external one's) with a fraction in 1/65536. Velocities in "units" = RPM * 100 * microstep factor, so that a
  *          ramp value in hundredths is the change per pulse whatever the factor, and interval = K / v.
  * Context: main loop only; no hardware. Tests: test/host/test_ramp.c, test/avr/.
  * Errors:  none; what is asked for has been checked (profile_check).
@@ -24,10 +24,13 @@ typedef struct {
     uint16_t frac_q16; /* 1/65536 tick */
 } ramp_time_t;
 
-/* Depends on steps per revolution: 2 * 65536 * K, K = 96e9 / steps_per_rev (ticks times velocity units). */
+/* What ramps depend on: motor and clock. */
 typedef struct {
-    wide_t k2_q16;
+    wide_t k2_q16;          /* 2 * 65536 * K, K = 6000 * clock_hz / steps_per_rev (ticks times velocity units) */
+    uint32_t clock_hz;      /* ticks a second; below that of the CPU: the timer's external clock */
     uint16_t steps_per_rev;
+    uint8_t cycles_log2;    /* CPU cycles of a tick, rounded down to a power of two; 0: they are the same */
+    uint8_t split_ticks;    /* runs of shorter intervals than these are not split (block.h) */
 } ramp_constants_t;
 
 typedef struct {
@@ -45,6 +48,8 @@ typedef struct {
     uint32_t rate;      /* harmonic: step / K * 2^40; linear: c / K^2 * 2^48 */
     wide_t k2_q16;      /* as in the constants, for these units, but so many doublings, for which it has no room ... */
     uint8_t k_lacks;
+    uint8_t cycles_log2; /* as in the constants */
+    uint8_t split_ticks;
     wide_t x;           /* linear: v^2 ... */
     wide_t c;           /* ... and its change per pulse */
     uint8_t steep;      /* 0; 1: its runs may be longer; 2: planning it takes as long as playing it, or nearly */
@@ -56,8 +61,8 @@ typedef struct {
     uint16_t ticks;     /* interval in the last group, at most 65535 */
 } ramp_t;
 
-/* steps_per_rev >= 8 */
-void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev);
+/* steps_per_rev >= 8; clock_hz 400,000..16,000,000 */
+void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev, uint32_t clock_hz);
 
 /* Interval at a velocity. v >= 1. */
 ramp_time_t ramp_interval(const ramp_constants_t *constants, uint32_t v);

@@ -18,7 +18,7 @@ static motion_command_t command;
 /* Factory values of the manual: 200 steps per revolution, full step, slow speed 10 RPM. */
 void setUp(void)
 {
-    profile_basis(&basis, 200, 0, 10);
+    profile_basis(&basis, 200, 0, 10, 16000000);
     command = (motion_command_t){.count = 200, .velocity = 100, .accel = 100, .decel = 100};
 }
 
@@ -285,7 +285,7 @@ static void test_a_cycle_of_any_32_bits_is_kept_exactly(void)
 /* HAR-015, LIN-010, STP-001, STP-002, STP-003 */
 static void test_microsteps_multiply_all_phases(void)
 {
-    profile_basis(&basis, 200, 3, 10);
+    profile_basis(&basis, 200, 3, 10, 16000000);
     plan();
     assert_split(720, 160, 720);
     command.count = 1001;
@@ -301,7 +301,7 @@ static void test_microsteps_multiply_all_phases(void)
 /* STP-010 */
 static void test_counts_in_pulses_are_not_multiplied(void)
 {
-    profile_basis(&basis, 200, 3, 10);
+    profile_basis(&basis, 200, 3, 10, 16000000);
     command.count = 2000;
     command.flags = MOTION_PULSES;
     plan();
@@ -328,7 +328,7 @@ static void test_linear_ramp_steps_follow_the_square_of_the_speed(void)
 static void test_linear_steps_follow_the_steps_per_revolution(void)
 {
     uint32_t at_200 = profile_ramp_steps(&basis, 0, 60000, 100, true);
-    profile_basis(&basis, 400, 0, 10);
+    profile_basis(&basis, 400, 0, 10, 16000000);
     TEST_ASSERT_UINT32_WITHIN(1, 2 * at_200, profile_ramp_steps(&basis, 0, 60000, 100, true));
 }
 
@@ -381,7 +381,7 @@ static void test_periods_below_2_us_or_the_pulse_and_1_us_are_refused(void)
     TEST_ASSERT_EQUAL(STATUS_OK, profile_check(&basis, &command, 2));
     command.velocity = 100001;
     TEST_ASSERT_EQUAL(STATUS_PERIOD_TOO_SHORT, profile_check(&basis, &command, 2));
-    profile_basis(&basis, 200, 7, 10);
+    profile_basis(&basis, 200, 7, 10, 16000000);
     command.velocity = 1171; /* 256.1 us */
     TEST_ASSERT_EQUAL(STATUS_OK, profile_check(&basis, &command, 1));
     command.velocity = 1172; /* 255.97 us */
@@ -406,7 +406,7 @@ static void test_counts_reach_32_bits_and_no_further(void)
     command.extra_pulses = 1;
     TEST_ASSERT_EQUAL(STATUS_NUMBER_TOO_LARGE, profile_check(&basis, &command, 2));
     command.extra_pulses = 0;
-    profile_basis(&basis, 200, 4, 10);
+    profile_basis(&basis, 200, 4, 10, 16000000);
     command.count = UINT32_MAX >> 4;
     TEST_ASSERT_EQUAL(STATUS_OK, profile_check(&basis, &command, 2));
     command.count++;
@@ -466,7 +466,7 @@ static const uint32_t appendix_d[30][12] TABLE = {
 static void test_all_360_entries_of_appendix_d_are_twice_the_formula(void)
 {
     /* V^2 / (alpha a) = V^2 / (2 (alpha / 2) a): the steps of a motor with twice the steps per revolution. */
-    profile_basis(&basis, 400, 0, 10);
+    profile_basis(&basis, 400, 0, 10, 16000000);
     for (uint8_t a = 0; a < 30; a++) {
         for (uint8_t column = 0; column < 12; column++) {
             uint32_t v = (column + 1u) * 5000u;

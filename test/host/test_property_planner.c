@@ -306,7 +306,7 @@ static bool ramp_is_right(const trial_t *t, const char *phase, ramp_t *ramp,
 static void check_planned(const trial_t *t)
 {
     profile_basis_t basis;
-    profile_basis(&basis, (uint16_t)t->motor.steps_per_rev, t->factor_log2, (uint8_t)t->motor.slow_rpm);
+    profile_basis(&basis, (uint16_t)t->motor.steps_per_rev, t->factor_log2, (uint8_t)t->motor.slow_rpm, 16000000);
     const motion_command_t *c = &t->command;
     bool too_fast = exact_cycle_us(&t->motor, c) < 2u * t->motor.factor;
     status_t status = profile_check(&basis, c, PULSE_US);
@@ -544,7 +544,7 @@ static void check_played(const trial_t *t)
             return; /* refused: nothing to be played */
     }
     profile_basis_t basis;
-    profile_basis(&basis, (uint16_t)t->motor.steps_per_rev, t->factor_log2, (uint8_t)t->motor.slow_rpm);
+    profile_basis(&basis, (uint16_t)t->motor.steps_per_rev, t->factor_log2, (uint8_t)t->motor.slow_rpm, 16000000);
     profile_t plan;
     profile_plan(&plan, &basis, &t->command, t->in_play_rpm * 100u << t->factor_log2);
 

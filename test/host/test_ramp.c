@@ -24,7 +24,7 @@ static block_t block; /* the last group's runs */
 
 void setUp(void)
 {
-    ramp_constants(&constants, 200);
+    ramp_constants(&constants, 200, 16000000);
 }
 
 void tearDown(void)
@@ -190,7 +190,7 @@ static void test_speed_and_interval_are_each_others_inverse(void)
 
 static uint32_t first_linear_interval(uint16_t steps_per_rev, uint8_t factor_log2)
 {
-    ramp_constants(&constants, steps_per_rev);
+    ramp_constants(&constants, steps_per_rev, 16000000);
     case_t c = {.linear = 1, .faster = 1, .factor_log2 = factor_log2, .centi = 1047, .pulses = 1000};
     begin(&c);
     ramp_time_t first;
