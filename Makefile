@@ -121,7 +121,7 @@ AVR_TESTS := test_number test_line test_session test_wide test_block test_ramp t
 
 # Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
 IMAGE_TESTS := test_image_boot test_image_pins test_image_encoder test_image_motion test_image_queue \
-    test_image_sequence test_image_terminal test_image_stop test_image_configure test_image_system test_image_timing test_image_stress \
+    test_image_sequence test_image_terminal test_image_stop test_image_configure test_image_powercut test_image_system test_image_timing test_image_stress \
     test_image_estop test_image_ops test_image_processor test_image_fuzz test_image_manual
 test_image_processor_SRCS := test/image/processor_model.c
 # What every whole-image test is linked with.
@@ -366,6 +366,11 @@ fuzz-image-long: ## 10^5 damaged lines at the image on the board; SAC_FUZZ_SEED=
 test-processor: ## 2,000 random scripts on the image and on the model of the command processor
 	@$(MAKE) -s --no-print-directory $(BUILD)/image/test_image_processor $(BUILD)/sac.hex
 	@SAC_SCRIPTS=$${SAC_SCRIPTS:-2000} $(BUILD)/image/test_image_processor
+
+.PHONY: test-powercut
+test-powercut: ## power cuts on the image while it saves, ten times as many as `make test` makes (some minutes)
+	@$(MAKE) -s --no-print-directory $(BUILD)/image/test_image_powercut $(BUILD)/sac.hex
+	@SAC_CUTS=$${SAC_CUTS:-10} $(BUILD)/image/test_image_powercut
 
 .PHONY: test-long
 test-long: ## ten million mixed steps with the terminal busy (some minutes); `make test` makes a million

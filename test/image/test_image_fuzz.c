@@ -209,6 +209,8 @@ static const char *answer(void)
         if (has_restarted()) { /* perhaps with another rate: what is said cannot be read */
             restarted = true;
             image_run(100 * MS);
+            if (image_peek("cause") != STATUS_OK) /* it has loaded its settings as well */
+                fail("the board was reset by its watchdog");
             return image_take_text();
         }
         if (board_cycle(board) <= end)
