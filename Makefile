@@ -68,7 +68,9 @@ FIRMWARE_SRCS := \
     firmware/cli/motion_syntax.c \
     firmware/cli/configure.c \
     firmware/cli/display.c \
+    firmware/cli/range.c \
     firmware/cli/text.c \
+    firmware/base/flash.c \
     firmware/base/number.c \
     firmware/base/status.c
 
@@ -82,10 +84,10 @@ HOST_TESTS := test_number test_status test_baud test_line test_settings test_sto
 FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 STORE_SRCS := firmware/eeprom/store.c firmware/base/crc16.c firmware/settings.c test/host/fakes/eeprom_port_fake.c
 CLI_SRCS := firmware/cli/commands.c firmware/cli/configure.c firmware/cli/display.c firmware/cli/text.c firmware/cli/motion_syntax.c \
-    firmware/base/number.c firmware/queue/encoder.c firmware/queue/ops.c firmware/queue/queue.c firmware/queue/session.c $(STORE_SRCS) \
+    firmware/cli/range.c firmware/base/flash.c firmware/base/number.c firmware/queue/encoder.c firmware/queue/ops.c firmware/queue/queue.c firmware/queue/session.c $(STORE_SRCS) \
     test/host/fakes/encoder_port_fake.c $(FAKE_SRCS)
 test_number_SRCS := firmware/base/number.c
-test_status_SRCS := firmware/base/status.c
+test_status_SRCS := firmware/base/status.c firmware/base/flash.c
 test_line_SRCS := firmware/cli/line.c
 test_settings_SRCS := firmware/settings.c
 test_store_SRCS := $(STORE_SRCS)
@@ -94,7 +96,7 @@ test_queue_SRCS := firmware/queue/queue.c firmware/queue/session.c $(STORE_SRCS)
 test_ops_SRCS := firmware/queue/ops.c firmware/queue/session.c firmware/settings.c $(FAKE_SRCS)
 test_encoder_SRCS := firmware/queue/encoder.c test/host/fakes/encoder_port_fake.c test/host/fakes/engine_fake.c \
     test/host/fakes/terminal_port_fake.c firmware/settings.c
-test_motion_syntax_SRCS := firmware/cli/motion_syntax.c firmware/base/number.c firmware/queue/session.c \
+test_motion_syntax_SRCS := firmware/cli/motion_syntax.c firmware/cli/range.c firmware/base/flash.c firmware/base/number.c firmware/queue/session.c \
     firmware/settings.c $(FAKE_SRCS)
 test_commands_SRCS := $(CLI_SRCS)
 test_configure_SRCS := $(CLI_SRCS)

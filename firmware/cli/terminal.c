@@ -5,6 +5,7 @@
 #include "cli/commands.h"
 #include "cli/display.h"
 #include "cli/line.h"
+#include "cli/range.h"
 #include "cli/terminal_port.h"
 #include "cli/text.h"
 #include "cli/timebase_port.h"
@@ -28,7 +29,7 @@ static struct terminal {
     bool behind;            /* a prompt is owed; no echo until it is printed */
     bool owes_new_line;     /* the cursor stands behind the last line that was echoed */
     status_t owed_status;   /* the first error since, or STATUS_OK */
-    const char *owed_range; /* of that error */
+    uint8_t owed_range;   /* of that error */
 
     /* Debug mode: how long the last line took. The clock starts with the line, and again at its end. */
     uint8_t owes_times; /* pieces of the report */
@@ -53,7 +54,7 @@ static void put_error(void)
     text_put_flash(status_words(terminal.owed_status));
     if (terminal.owed_status == STATUS_RANGE) {
         terminal_port_put(' ');
-        text_put_flash(terminal.owed_range);
+        text_put_flash(range_text(terminal.owed_range));
     }
     text_new_line();
 }
@@ -108,7 +109,7 @@ static void owe(status_t status)
     }
     if (t->owed_status == STATUS_OK) {
         t->owed_status = status;
-        t->owed_range = commands_refused_range();
+        t->owed_range = range_refused();
     }
     t->echoed = 0;
 }
