@@ -158,7 +158,7 @@ AVR_SMALLER = -Os -mcall-prologues -mstrict-X -fno-gcse -fno-move-loop-invariant
     -fno-tree-sink -fno-ssa-phiopt -fweb -frename-registers -fno-tree-copy-prop -fno-tree-coalesce-vars \
     -fno-tree-scev-cprop -fno-tree-copyrename -flto-partition=none $(if $(filter 5.%,$(AVR_VERSION)),-fno-toplevel-reorder)
 AVR_CFLAGS = $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 $(AVR_SMALLER) -g -ffunction-sections -fdata-sections -fshort-enums \
-    -fstack-usage -Ifirmware $(AVR_WARNINGS)
+    -fstack-usage -I$(BUILD)/packed -Ifirmware $(AVR_WARNINGS)
 # The segment ring stands alone in the first 256 bytes of RAM, so that the step interrupt addresses it with one byte.
 AVR_LDFLAGS := $(AVR_MCU) -Wl,--gc-sections -mrelax -Wl,--section-start=.segments=0x800100 -Wl,-Tdata=0x800200
 
@@ -173,7 +173,15 @@ $(BUILD)/firmware/flags: FORCE
 	@echo '$(AVR) $(AVR_CFLAGS) $(AVR_LDFLAGS) $(DEFS) $(FIRMWARE_SRCS)' >$@.$$$$ && \
 	    if cmp -s $@.$$$$ $@; then rm $@.$$$$; else mv $@.$$$$ $@; fi
 
-$(BUILD)/firmware/%.o: firmware/% $(BUILD)/firmware/flags
+# The tables with texts, packed: the compiler finds them before those in firmware/.
+PACKED := $(BUILD)/packed/done
+$(PACKED): tools/pack_texts.py firmware/cli/pairs.def firmware/cli/commands.def firmware/cli/display.def firmware/base/status.def \
+    firmware/settings.def
+	@mkdir -p $(@D)
+	$(Q)$(PYTHON) $< $(@D)
+	@touch $@
+
+$(BUILD)/firmware/%.o: firmware/% $(BUILD)/firmware/flags $(PACKED)
 	@mkdir -p $(@D)
 	$(call say,CC  $@)
 	$(Q)$(AVR)gcc $(AVR_CFLAGS) $(DEFS) -MMD -MP -c -o $@ $<

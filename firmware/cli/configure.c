@@ -176,15 +176,12 @@ static void put_byte(uint16_t address)
 /* The name and the tabs behind it: values stand in column 16, or 40. */
 static void put_name(const char *name)
 {
-    uint8_t column = 1;
-    for (uint8_t c; (c = flash_u8(name++)) != '\0'; column++) {
-        if (column == 1) {
-            terminal_port_put(' ');
-        }
-        terminal_port_put(c);
+    if (flash_u8(name) != '\0') {
+        terminal_port_put(' ');
     }
+    const uint8_t length = text_put_flash(name);
     terminal_port_put('\t');
-    if (column < 7) {
+    if (length < 6) {
         terminal_port_put('\t');
     }
 }
