@@ -32,7 +32,11 @@ typedef struct {
 static bool debugging;
 
 /* What a line is read as. */
-static enum { MODE_COMMANDS, MODE_QUEUE, MODE_ARRAY, MODE_CONFIGURE } mode;
+static enum { /* in the order of the prompts */
+    MODE_COMMANDS, MODE_QUEUE,
+    MODE_ARRAY,
+    MODE_CONFIGURE
+} mode;
 
 /* The motion command, or single value, being read ahead: how many characters of the line it has seen, 0 for none. */
 static motion_syntax_t ahead;
@@ -54,7 +58,13 @@ static NOINLINE status_t read_only_number(const char *rest, uint8_t range)
     return status == STATUS_OK && motion_syntax_more(*ahead.behind) ? STATUS_SYNTAX : status;
 }
 
-/* What has been read. */
+/* Where a number may be missing. */
+static NOINLINE status_t optional(status_t status)
+{
+    return status == STATUS_NUMBER_MISSING ? STATUS_OK : status;
+}
+
+/* What has been read; 0 if there was no number. */
 static inline uint8_t number_8(void)
 {
     return (uint8_t)ahead.value;
@@ -110,11 +120,8 @@ static status_t command_one_shot(const char *rest)
 /* x leaves a program mode; x<position> executes an entry. */
 static status_t command_xref(const char *rest)
 {
-    if (!motion_syntax_more(*rest)) {
-        return STATUS_OK;
-    }
     const status_t status = read_only_number(rest, RANGE_POSITION);
-    return status == STATUS_OK ? queue_preempt(number_8()) : status;
+    return status == STATUS_OK ? queue_preempt(number_8()) : optional(status);
 }
 
 static status_t command_run_array(const char *rest)
@@ -180,16 +187,11 @@ static status_t command_loop_bound(const char *rest)
 
 static status_t command_loop_passes(const char *rest)
 {
-    uint16_t passes = 0;
-    if (motion_syntax_more(*rest)) {
-        const status_t status = read_only_number(rest, RANGE_COUNT);
-        if (status != STATUS_OK) {
-            return status;
-        }
-        passes = number_16();
+    const status_t status = optional(read_only_number(rest, RANGE_COUNT));
+    if (status == STATUS_OK) {
+        queue_loop_passes(number_16());
     }
-    queue_loop_passes(passes);
-    return STATUS_OK;
+    return status;
 }
 
 static status_t command_loop_all(const char *rest)
@@ -320,32 +322,33 @@ static status_t command_debug(const char *rest)
 
 static status_t command_ramp(const char *rest)
 {
-    if (!motion_syntax_more(*rest)) {
-        return STATUS_OK; /* neither 0 nor 1: no change (A-SYS-02) */
-    }
     const status_t status = read_only_number(rest, RANGE_FLAG);
     if (status == STATUS_OK) {
         session_set_linear(number_8());
     }
-    return status;
+    return optional(status); /* neither 0 nor 1: no change (A-SYS-02) */
 }
 
 /* $O, $H, $K: soft ops 0 or 1; CRC and acknowledgements off with 0, and on with anything else. */
 static status_t command_option(const char *rest)
 {
     const char letter = rest[-1];
-    bool on = true;
-    if (motion_syntax_more(*rest)) {
-        const status_t status = read_only_number(rest, letter == 'O' ? RANGE_FLAG : RANGE_COUNT);
-        if (status != STATUS_OK) {
-            return status;
-        }
-        on = number_16() != 0;
-    } else if (letter == 'O') {
-        return STATUS_OK;
+    uint8_t option = SESSION_SOFT_OPS;
+    uint8_t range = RANGE_FLAG;
+    if (letter != 'O') {
+        option = letter == 'H' ? SESSION_CRC : SESSION_ACK;
+        range = RANGE_COUNT;
     }
-    session_set_option(letter == 'O' ? SESSION_SOFT_OPS : letter == 'H' ? SESSION_CRC : SESSION_ACK, on);
-    return STATUS_OK;
+    status_t status = read_only_number(rest, range);
+    uint8_t on = number_16() != 0;
+    if (status == STATUS_NUMBER_MISSING && letter != 'O') {
+        status = STATUS_OK;
+        on = 1;
+    }
+    if (status == STATUS_OK) {
+        session_set_option(option, on);
+    }
+    return optional(status);
 }
 
 /* $F, $P, $U */
@@ -508,7 +511,7 @@ bool commands_at_once(char character)
 
 const char *commands_prompt(void)
 {
-    return mode == MODE_QUEUE ? FLASH_TEXT("Q>") : mode == MODE_ARRAY ? FLASH_TEXT("X>") : FLASH_TEXT("SAC>");
+    return flash_text(FLASH_TEXT("SAC>\0Q>\0X>\0SAC>"), mode);
 }
 
 bool commands_debugging(void)

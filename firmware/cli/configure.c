@@ -119,18 +119,22 @@ NOINLINE bool configure_has_cell(void)
     return cell != SCREEN_END && cell != BYTES_END && (cell != LIST_END || commands_debugging());
 }
 
-static void put_value(const char *row)
+/* The lowest byte of the value, which decides what is shown of it; the whole value to `value`. */
+static uint8_t read_value(uint8_t place, uint32_t *value)
 {
-    const uint8_t place = flash_u8(row + ROW_PLACE);
-    const uint8_t kind = flash_u8(row + ROW_KIND);
-    uint8_t offset = place & PLACE_OFFSET;
     uint8_t more = place >> PLACE_MORE_BIT;
-    uint32_t value = 0;
-    uint8_t *byte = (uint8_t *)&value;
-    do {
-        *byte++ = store_setting(offset++);
-    } while (more-- > 0);
-    uint8_t lowest = (uint8_t)value;
+    for (;;) {
+        const uint8_t byte = store_setting((uint8_t)((place & PLACE_OFFSET) + more));
+        *value = *value << 8 | byte;
+        if (more-- == 0) {
+            return byte;
+        }
+    }
+}
+
+static void put_value(uint8_t kind, uint8_t offset, uint32_t value)
+{
+    const uint8_t lowest = (uint8_t)value;
     if (kind == RANGE_DIRECTION) {
         const char *text = FLASH_TEXT("CCW");
         if (lowest == 0) {
@@ -138,12 +142,8 @@ static void put_value(const char *row)
         }
         text_put_flash(text);
     } else if (kind == RANGE_MAP) {
-        for (uint8_t left = 7;; left--) {
-            terminal_port_put((uint8_t)('0' + lowest));
-            if (left == 0) {
-                break;
-            }
-            lowest = store_setting(offset++);
+        for (uint8_t left = 8; left > 0; left--) {
+            terminal_port_put((uint8_t)('0' + store_setting(offset++)));
         }
     } else if (kind == RANGE_RAMP) {
         display_put_accel((accel_code_t)value);
@@ -173,8 +173,8 @@ static void put_byte(uint16_t address)
     }
 }
 
-/* The name and the tabs behind it: values stand in column 16, or 40. */
-static void put_name(const char *name)
+/* The name and the tabs behind it: values stand in column 16, or 40. Returns the length of the name. */
+static uint8_t put_name(const char *name)
 {
     if (flash_u8(name) != '\0') {
         terminal_port_put(' ');
@@ -184,6 +184,7 @@ static void put_name(const char *name)
     if (length < 6) {
         terminal_port_put('\t');
     }
+    return length;
 }
 
 /* A letter without a parameter has an empty cell. */
@@ -196,31 +197,35 @@ void configure_put_cell(void)
     }
     const bool screen = at < SCREEN_END;
     uint8_t letter = (uint8_t)at;
-    bool right = false; /* the end of a line */
+    uint8_t ends = 0; /* the line */
     if (screen) {
-        right = letter & 1;
+        ends = letter & 1;
         letter = (uint8_t)((letter >> 1) + 'A');
-        if (right) {
+        if (ends) {
             letter |= 0x20;
         }
     }
     const char *row = find(letter);
     if (row != 0) {
-        if (right) {
+        if (ends) {
             terminal_port_put('\t');
         }
         terminal_port_put(letter);
+        uint8_t shown = 1;
         if (screen) {
-            put_name(row + ROW_NAME);
+            shown = put_name(row + ROW_NAME);
         } else {
             terminal_port_put(' ');
-            right = true;
+            ends = 1;
         }
-        if (!screen || letter != 'D' || store_setting(flash_u8(row + ROW_PLACE)) != 0) {
-            put_value(row);
+        const uint8_t place = flash_u8(row + ROW_PLACE);
+        uint32_t value = 0;
+        shown |= read_value(place, &value); /* what has no name is shown if it is not 0 */
+        if (shown) {
+            put_value(flash_u8(row + ROW_KIND), place & PLACE_OFFSET, value);
         }
     }
-    if (right) {
+    if (ends) {
         text_new_line();
     }
 }
