@@ -59,7 +59,7 @@ static NOINLINE status_t read_only_number(const char *rest, uint8_t range)
 }
 
 /* Where a number may be missing. */
-static NOINLINE status_t optional(status_t status)
+static status_t optional(status_t status)
 {
     return status == STATUS_NUMBER_MISSING ? STATUS_OK : status;
 }
