@@ -75,27 +75,36 @@ static inline uint16_t number_16(void)
     return (uint16_t)ahead.value;
 }
 
-/* m, and v, vc, a, d alone: all of the line has been read ahead. */
-static status_t command_read_ahead(const char *rest)
+/* What has been read: a command for the queue, or the one-shot; or v, vc, a, d alone. */
+static NOINLINE status_t execute_read(bool one_shot)
 {
-    (void)rest;
+    motion_syntax_t *read = &ahead;
+    NEAR(read);
     status_t status = motion_syntax_end(&ahead);
     if (status != STATUS_OK) {
         return status;
     }
-    if (!ahead.single && ahead.command.count == 0) {
-        return queue_preempt_with(QUEUE_CONTINUOUS, &ahead.command); /* it keeps what it names for itself (line 588) */
-    }
-    if (!ahead.single) {
+    if (!read->single) {
+        const uint8_t endless = read->command.count == 0;
+        if (endless || one_shot) { /* it keeps what it names for itself (line 588) */
+            return queue_preempt_with(endless ? QUEUE_CONTINUOUS : QUEUE_ONE_SHOT, &ahead.command);
+        }
         status = queue_add(&ahead.command); /* it begins at once: everything else can wait */
     }
     if (status == STATUS_OK) {
         motion_syntax_keep(&ahead, &session);
-        if (ahead.single == MOTION_SYNTAX_VELOCITY) {
+        if (read->single == MOTION_SYNTAX_VELOCITY) {
             queue_follow(&ahead.command);
         }
     }
     return status;
+}
+
+/* m, and v, vc, a, d alone: all of the line has been read ahead. */
+static status_t command_read_ahead(const char *rest)
+{
+    (void)rest;
+    return execute_read(false);
 }
 
 static NOINLINE void read_rest(const char *rest)
@@ -110,11 +119,7 @@ static status_t command_one_shot(const char *rest)
 {
     motion_syntax_begin(&ahead, 'm', &session);
     read_rest(rest);
-    const status_t status = motion_syntax_end(&ahead);
-    if (status != STATUS_OK) {
-        return status;
-    }
-    return queue_preempt_with(ahead.command.count == 0 ? QUEUE_CONTINUOUS : QUEUE_ONE_SHOT, &ahead.command);
+    return execute_read(true);
 }
 
 /* x leaves a program mode; x<position> executes an entry. */
@@ -495,7 +500,7 @@ NOINLINE status_t commands_execute(const char *line, uint8_t length)
     characters_ahead = 0;
     /* What was read ahead without an error needs no search: time counts. (vd is an error there.) */
     if (characters != 0 && ahead.status == STATUS_OK) {
-        return command_read_ahead(line);
+        return execute_read(false);
     }
     return execute_by_table(line);
 }

@@ -188,7 +188,7 @@ static uint8_t put_name(const char *name)
 }
 
 /* A letter without a parameter has an empty cell. */
-void configure_put_cell(void)
+NOINLINE void configure_put_cell(void)
 {
     const uint16_t at = cell++;
     if (at >= LIST_END) {

@@ -230,8 +230,8 @@ static void print_piece(void)
     motion_command_t defaults; /* or a row of the queue: the command whose values are shown */
     const motion_command_t *command = &defaults;
     session_template(&shown.session, &defaults);
-    if (shown.current > DISPLAY_ROW || (shown.current == DISPLAY_QUEUE && shown.row <= last_row())) {
-        command = queue_entry(shown.row);
+    if (shown.current > DISPLAY_ROW || shown.current == DISPLAY_QUEUE) {
+        command = queue_entry(shown.row % QUEUE_POSITIONS); /* (also behind the last row, where no field is of a row) */
     }
     const char *text = shown.text;
     for (uint8_t put = 0; put < TEXT_PIECE_BYTES - TEXT_LONGEST;) {

@@ -74,7 +74,7 @@ static void refuse(motion_syntax_t *syntax, status_t status)
     syntax->status = status;
 }
 
-static NOINLINE void refuse_range(motion_syntax_t *syntax, uint8_t range)
+static void refuse_range(motion_syntax_t *syntax, uint8_t range)
 {
     syntax->status = range_refuse(range);
 }
