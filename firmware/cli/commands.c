@@ -79,7 +79,6 @@ static inline uint16_t number_16(void)
 static NOINLINE status_t execute_read(bool one_shot)
 {
     motion_syntax_t *read = &ahead;
-    NEAR(read);
     status_t status = motion_syntax_end(&ahead);
     if (status != STATUS_OK) {
         return status;

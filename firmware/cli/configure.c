@@ -116,7 +116,11 @@ void configure_first_cell(bool screen)
 
 NOINLINE bool configure_has_cell(void)
 {
-    return cell != SCREEN_END && cell != BYTES_END && (cell != LIST_END || commands_debugging());
+    const uint16_t next = cell;
+    if (next == LIST_END) {
+        return commands_debugging();
+    }
+    return next != SCREEN_END && next != BYTES_END;
 }
 
 /* The lowest byte of the value, which decides what is shown of it; the whole value to `value`. */
@@ -166,7 +170,7 @@ static void put_byte(uint16_t address)
     const uint8_t byte = eeprom_port_read(address);
     put_hex_digit(byte >> 4);
     put_hex_digit(byte & 0x0F);
-    if ((address & 0x0F) == 0x0F) {
+    if ((uint8_t)(address + 1) % 16 == 0) {
         text_new_line();
     } else {
         terminal_port_put(' ');

@@ -13,7 +13,7 @@
 #include "queue/session.h"
 #include "settings.h"
 
-static struct {
+static struct shown {
     const char *text;      /* in flash: what is still to come of the present text; 0: nothing is printed */
     uint8_t ruled;         /* how many signs of a rule have been printed */
     uint8_t row;           /* of the queue */
@@ -23,6 +23,13 @@ static struct {
     session_t session; /* what `cf` shows: as it was when the display began, and among its options whether GAP testing
                         * and debug mode were on */
 } shown;
+
+static inline struct shown *self(void)
+{
+    struct shown *s = &shown;
+    NEAR(s);
+    return s;
+}
 
 #define SHOWN_GAP (1u << 3)
 #define SHOWN_DEBUG (1u << 4)
@@ -159,27 +166,28 @@ static void print_field(uint8_t field, const motion_command_t *command)
 
 static void begin(uint8_t display)
 {
-    shown.current = display;
+    struct shown *const s = self();
+    s->current = display;
     if (display > DISPLAY_ROW) {
-        shown.row = (uint8_t)(display - DISPLAY_ROW);
-        shown.text = queue_text;
+        s->row = (uint8_t)(display - DISPLAY_ROW);
+        s->text = queue_text;
         return;
     }
-    shown.text = flash_pointer(&texts[display]);
-    shown.row = 0;
+    s->text = flash_pointer(&texts[display]);
+    s->row = 0;
     configure_first_cell(display == DISPLAY_CONFIGURE);
-    shown.session = session;
+    s->session = session;
     if (engine_gap()) {
-        shown.session.options |= SHOWN_GAP;
+        s->session.options |= SHOWN_GAP;
     }
     if (commands_debugging()) {
-        shown.session.options |= SHOWN_DEBUG;
+        s->session.options |= SHOWN_DEBUG;
         if (display == DISPLAY_QUEUE) {
-            shown.row = UINT8_MAX; /* positions 0 and 31 are shown in debug mode only */
+            s->row = UINT8_MAX; /* positions 0 and 31 are shown in debug mode only */
         }
     }
     if (encoder_throttles()) {
-        shown.session.flags |= MOTION_CCW;
+        s->session.flags |= MOTION_CCW;
     }
 }
 
@@ -196,7 +204,7 @@ static void next_display(void)
     }
 }
 
-static NOINLINE uint8_t last_row(void)
+static uint8_t last_row(void)
 {
     return shown.session.options & SHOWN_DEBUG ? QUEUE_ONE_SHOT : QUEUE_LAST;
 }
@@ -259,8 +267,9 @@ static void print_piece(void)
         if (character == CHOICE_ELSE) {
             text = behind(text, CHOICE_END);
         } else if (character >= CHOICE_BEGIN) {
-            const uint8_t bits = character >= CHOICE_OPTION ? shown.session.options : command->flags;
-            if (!(uint8_t)(bits & character & CHOICE_BITS)) {
+            uint8_t bits = character >= CHOICE_OPTION ? shown.session.options : command->flags;
+            bits = (uint8_t)(bits & character & CHOICE_BITS);
+            if (bits == 0) {
                 text = behind(text, CHOICE_ELSE);
             }
         } else if (character == '\n') {
@@ -282,14 +291,15 @@ void display_init(void)
 
 status_t display_request(display_t display)
 {
-    if (shown.text == 0) {
+    struct shown *const s = self();
+    if (s->text == 0) {
         begin(display);
         return STATUS_OK;
     }
-    if (shown.waiting_count == DISPLAY_WAITING) {
+    if (s->waiting_count == DISPLAY_WAITING) {
         return STATUS_BUSY;
     }
-    shown.waiting[shown.waiting_count++] = display;
+    s->waiting[s->waiting_count++] = display;
     return STATUS_OK;
 }
 
