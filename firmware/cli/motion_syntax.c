@@ -362,7 +362,7 @@ status_t motion_syntax_end(motion_syntax_t *syntax)
         if (syntax->parameter >= PARAMETER_ACCEL) {
             return STATUS_OK; /* a or d */
         }
-        command->count = 1; /* the engine checks commands: is this velocity possible at all? */
+        *(uint8_t *)&command->count = 1; /* it was 0. The engine checks commands: is this velocity possible at all? */
     }
     return engine_check(command);
 }
