@@ -77,7 +77,7 @@ static void put_times(struct terminal *t)
     text_put_flash(words);
     text_put_u32(*us);
     text_put_flash(FLASH_TEXT(" us"));
-    if (t->owes_times == 0) {
+    if (us == &t->loaded_us) {
         text_new_line();
     }
 }
@@ -146,8 +146,10 @@ static void erase(struct terminal *t)
 
 static void end_line(struct terminal *t)
 {
-    const uint8_t timed = line_begun(&t->line) ? t->timing : 0;
-    if (timed) {
+    if (!line_begun(&t->line)) {
+        t->timing = false;
+    }
+    if (t->timing) {
         since(&t->received_us);
         t->loaded_us = 0;
         since(&t->loaded_us);
@@ -158,12 +160,13 @@ static void end_line(struct terminal *t)
     } else {
         commands_read_ahead(terminal.line.text, 0);
     }
-    t->held = status == STATUS_WAIT;
-    if (t->held) {
+    t->held = false;
+    if (status == STATUS_WAIT) {
+        t->held = true;
         t->timing = false;
         return;
     }
-    if (timed && commands_debugging()) {
+    if (t->timing && commands_debugging()) {
         since(&t->loaded_us);
         t->owes_times = 2;
     }
@@ -198,17 +201,17 @@ void terminal_init(status_t reported)
 /* Takes what has arrived, up to the first byte that ends or changes a line otherwise than by one more character. */
 static line_event_t take(struct terminal *t, uint8_t *bytes)
 {
-    for (; *bytes > 0; --*bytes) {
+    while (*bytes > 0) {
         const int16_t byte = terminal_port_get();
         if (byte < 0) {
             break;
         }
+        --*bytes;
         if (byte == TERMINAL_PORT_DAMAGED) {
             line_damage(&t->line);
         } else if (line_begun(&t->line) || begin_line(t, (uint8_t)byte)) {
             const line_event_t event = line_take(&t->line, (uint8_t)byte);
             if (event > LINE_APPENDED) {
-                --*bytes;
                 return event;
             }
         }
