@@ -3,8 +3,9 @@
 
 NOINLINE const char *flash_text(const char *texts, uint8_t number)
 {
-    for (; number > 0; number--) {
-        while (flash_u8(texts++) != '\0') {
+    while (number > 0) {
+        if (flash_u8(texts++) == '\0') {
+            number--;
         }
     }
     return texts;

@@ -173,12 +173,14 @@ static NOINLINE status_t program_array(const char *line)
 /* l ends, l<passes> runs the array. */
 static status_t command_loop(const char *rest)
 {
-    if (!motion_syntax_more(*rest)) {
-        queue_loop_end();
-        return STATUS_OK;
-    }
     const status_t status = read_only_number(rest, RANGE_COUNT);
-    return status == STATUS_OK ? queue_array_run(number_16()) : status;
+    if (status == STATUS_OK) {
+        return queue_array_run(number_16());
+    }
+    if (status == STATUS_NUMBER_MISSING) {
+        queue_loop_end();
+    }
+    return optional(status);
 }
 
 /* ls and lf */

@@ -9,7 +9,6 @@ static const char ranges[] FLASH =
 #include "settings.def"
 #undef SETTING_KIND
     "1..30\0"
-    "0..30\0"
     "0..65535";
 
 static uint8_t refused;

@@ -15,8 +15,8 @@ typedef enum {
 #include "settings.def"
 #undef SETTING_KIND
     RANGE_POSITION, /* of the queue */
-    RANGE_ENTRY,    /* of the xRef array, and what stands in it */
     RANGE_COUNT,
+    RANGE_ENTRY = RANGE_AUTORUN, /* of the xRef array, and what stands in it */
 } range_t;
 
 /* Whether the number that has been read is in the range; one above it becomes its end. */
