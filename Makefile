@@ -68,7 +68,9 @@ FIRMWARE_SRCS := \
     firmware/cli/motion_syntax.c \
     firmware/cli/configure.c \
     firmware/cli/display.c \
+    firmware/cli/range.c \
     firmware/cli/text.c \
+    firmware/base/flash.c \
     firmware/base/number.c \
     firmware/base/status.c
 
@@ -82,10 +84,10 @@ HOST_TESTS := test_number test_status test_baud test_line test_settings test_sto
 FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 STORE_SRCS := firmware/eeprom/store.c firmware/base/crc16.c firmware/settings.c test/host/fakes/eeprom_port_fake.c
 CLI_SRCS := firmware/cli/commands.c firmware/cli/configure.c firmware/cli/display.c firmware/cli/text.c firmware/cli/motion_syntax.c \
-    firmware/base/number.c firmware/queue/encoder.c firmware/queue/ops.c firmware/queue/queue.c firmware/queue/session.c $(STORE_SRCS) \
+    firmware/cli/range.c firmware/base/flash.c firmware/base/number.c firmware/queue/encoder.c firmware/queue/ops.c firmware/queue/queue.c firmware/queue/session.c $(STORE_SRCS) \
     test/host/fakes/encoder_port_fake.c $(FAKE_SRCS)
 test_number_SRCS := firmware/base/number.c
-test_status_SRCS := firmware/base/status.c
+test_status_SRCS := firmware/base/status.c firmware/base/flash.c
 test_line_SRCS := firmware/cli/line.c
 test_settings_SRCS := firmware/settings.c
 test_store_SRCS := $(STORE_SRCS)
@@ -94,7 +96,7 @@ test_queue_SRCS := firmware/queue/queue.c firmware/queue/session.c $(STORE_SRCS)
 test_ops_SRCS := firmware/queue/ops.c firmware/queue/session.c firmware/settings.c $(FAKE_SRCS)
 test_encoder_SRCS := firmware/queue/encoder.c test/host/fakes/encoder_port_fake.c test/host/fakes/engine_fake.c \
     test/host/fakes/terminal_port_fake.c firmware/settings.c
-test_motion_syntax_SRCS := firmware/cli/motion_syntax.c firmware/base/number.c firmware/queue/session.c \
+test_motion_syntax_SRCS := firmware/cli/motion_syntax.c firmware/cli/range.c firmware/base/flash.c firmware/base/number.c firmware/queue/session.c \
     firmware/settings.c $(FAKE_SRCS)
 test_commands_SRCS := $(CLI_SRCS)
 test_configure_SRCS := $(CLI_SRCS)
@@ -156,7 +158,7 @@ AVR_SMALLER = -Os -mcall-prologues -mstrict-X -fno-gcse -fno-move-loop-invariant
     -fno-tree-sink -fno-ssa-phiopt -fweb -frename-registers -fno-tree-copy-prop -fno-tree-coalesce-vars \
     -fno-tree-scev-cprop -fno-tree-copyrename -flto-partition=none $(if $(filter 5.%,$(AVR_VERSION)),-fno-toplevel-reorder)
 AVR_CFLAGS = $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 $(AVR_SMALLER) -g -ffunction-sections -fdata-sections -fshort-enums \
-    -fstack-usage -Ifirmware $(AVR_WARNINGS)
+    -fstack-usage -I$(BUILD)/packed -Ifirmware $(AVR_WARNINGS)
 # The segment ring stands alone in the first 256 bytes of RAM, so that the step interrupt addresses it with one byte.
 AVR_LDFLAGS := $(AVR_MCU) -Wl,--gc-sections -mrelax -Wl,--section-start=.segments=0x800100 -Wl,-Tdata=0x800200
 
@@ -171,7 +173,15 @@ $(BUILD)/firmware/flags: FORCE
 	@echo '$(AVR) $(AVR_CFLAGS) $(AVR_LDFLAGS) $(DEFS) $(FIRMWARE_SRCS)' >$@.$$$$ && \
 	    if cmp -s $@.$$$$ $@; then rm $@.$$$$; else mv $@.$$$$ $@; fi
 
-$(BUILD)/firmware/%.o: firmware/% $(BUILD)/firmware/flags
+# The tables with texts, packed: the compiler finds them before those in firmware/.
+PACKED := $(BUILD)/packed/done
+$(PACKED): tools/pack_texts.py firmware/cli/pairs.def firmware/cli/commands.def firmware/cli/display.def firmware/base/status.def \
+    firmware/settings.def
+	@mkdir -p $(@D)
+	$(Q)$(PYTHON) $< $(@D)
+	@touch $@
+
+$(BUILD)/firmware/%.o: firmware/% $(BUILD)/firmware/flags $(PACKED)
 	@mkdir -p $(@D)
 	$(call say,CC  $@)
 	$(Q)$(AVR)gcc $(AVR_CFLAGS) $(DEFS) -MMD -MP -c -o $@ $<

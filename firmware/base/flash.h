@@ -52,4 +52,7 @@ static inline const void *flash_pointer(const void *address)
 }
 #endif
 
+/* Text number `number` of several, each with its NUL behind it. */
+const char *flash_text(const char *texts, uint8_t number);
+
 #endif

@@ -10,11 +10,5 @@ static const char words[] FLASH = "\0"
 
 const char *status_words(status_t status)
 {
-    const char *text = words;
-    for (uint8_t left = status; left > 0; text++) {
-        if (flash_u8(text) == '\0') {
-            left--;
-        }
-    }
-    return text;
+    return flash_text(words, status);
 }

@@ -1,12 +1,12 @@
 #include "cli/commands.h"
 #include "base/flash.h"
 #include "base/inline.h"
-#include "base/number.h"
 #include "base/zeroed.h"
 #include "boot.h"
 #include "cli/configure.h"
 #include "cli/display.h"
 #include "cli/motion_syntax.h"
+#include "cli/range.h"
 #include "cli/terminal_port.h"
 #include "eeprom/store.h"
 #include "motion/engine.h"
@@ -32,64 +32,39 @@ typedef struct {
 static bool debugging;
 
 /* What a line is read as. */
-static enum { MODE_COMMANDS, MODE_QUEUE, MODE_ARRAY, MODE_CONFIGURE } mode;
-
-/* A range of numbers, and how an error names it. */
-typedef struct {
-    uint8_t least;
-    uint16_t most;
-    char text[9];
-} range_t;
-static const range_t positions FLASH = {QUEUE_FIRST, QUEUE_LAST, "1..30"};
-static const range_t array_entries FLASH = {0, QUEUE_ARRAY - 1, "0..30"};
-static const range_t flags FLASH = {0, 1, "0..1"};
-static const range_t counts FLASH = {0, UINT16_MAX, "0..65535"};
+static enum { /* in the order of the prompts */
+    MODE_COMMANDS, MODE_QUEUE,
+    MODE_ARRAY,
+    MODE_CONFIGURE
+} mode;
 
 /* The motion command, or single value, being read ahead: how many characters of the line it has seen, 0 for none. */
 static motion_syntax_t ahead;
 static uint8_t characters_ahead;
-static const char *behind_number; /* of read_number() */
-
-/* 0 at the end of the command: of the line, or a space. */
-static uint8_t more(char c)
-{
-    return (uint8_t)(c & ~' ');
-}
 
 /* -- handlers: rest is what follows the command's letters, up to the space or the end of the line --------------------- */
 
 /* The number that the text begins with, to ahead.value: no motion command is being read meanwhile. */
-static NOINLINE status_t read_number(const char *text, const range_t *range)
+static NOINLINE status_t read_number(const char *text, uint8_t range)
 {
-    motion_syntax_t *read = &ahead;
-    NEAR(read);
-    uint8_t digit = (uint8_t)(*text - '0');
-    if (digit > 9) {
-        return more(*text) ? STATUS_SYNTAX : STATUS_NUMBER_MISSING;
-    }
-    read->value = 0;
-    do {
-        if (!number_add_digit(&read->value, digit)) {
-            return STATUS_NUMBER_TOO_LARGE;
-        }
-        digit = (uint8_t)(*++text - '0');
-    } while (digit <= 9);
-    behind_number = text;
-    if (read->value < flash_u8(&range->least) || read->value > flash_u16(&range->most)) {
-        read->range = range->text;
-        return STATUS_RANGE;
-    }
-    return STATUS_OK;
+    const status_t status = motion_syntax_number(&ahead, text, false);
+    return status == STATUS_OK ? range_check(&ahead, range) : status;
 }
 
 /* The same, and nothing follows it. */
-static NOINLINE status_t read_only_number(const char *rest, const range_t *range)
+static NOINLINE status_t read_only_number(const char *rest, uint8_t range)
 {
     const status_t status = read_number(rest, range);
-    return status == STATUS_OK && more(*behind_number) ? STATUS_SYNTAX : status;
+    return status == STATUS_OK && motion_syntax_more(*ahead.behind) ? STATUS_SYNTAX : status;
 }
 
-/* What has been read. */
+/* Where a number may be missing. */
+static status_t optional(status_t status)
+{
+    return status == STATUS_NUMBER_MISSING ? STATUS_OK : status;
+}
+
+/* What has been read; 0 if there was no number. */
 static inline uint8_t number_8(void)
 {
     return (uint8_t)ahead.value;
@@ -100,27 +75,35 @@ static inline uint16_t number_16(void)
     return (uint16_t)ahead.value;
 }
 
-/* m, and v, vc, a, d alone: all of the line has been read ahead. */
-static status_t command_read_ahead(const char *rest)
+/* What has been read: a command for the queue, or the one-shot; or v, vc, a, d alone. */
+static NOINLINE status_t execute_read(bool one_shot)
 {
-    (void)rest;
+    motion_syntax_t *read = &ahead;
     status_t status = motion_syntax_end(&ahead);
     if (status != STATUS_OK) {
         return status;
     }
-    if (!ahead.single && ahead.command.count == 0) {
-        return queue_preempt_with(QUEUE_CONTINUOUS, &ahead.command); /* it keeps what it names for itself (line 588) */
-    }
-    if (!ahead.single) {
+    if (!read->single) {
+        const uint8_t endless = read->command.count == 0;
+        if (endless || one_shot) { /* it keeps what it names for itself (line 588) */
+            return queue_preempt_with(endless ? QUEUE_CONTINUOUS : QUEUE_ONE_SHOT, &ahead.command);
+        }
         status = queue_add(&ahead.command); /* it begins at once: everything else can wait */
     }
     if (status == STATUS_OK) {
         motion_syntax_keep(&ahead, &session);
-        if (ahead.single == MOTION_SYNTAX_VELOCITY) {
+        if (read->single == MOTION_SYNTAX_VELOCITY) {
             queue_follow(&ahead.command);
         }
     }
     return status;
+}
+
+/* m, and v, vc, a, d alone: all of the line has been read ahead. */
+static status_t command_read_ahead(const char *rest)
+{
+    (void)rest;
+    return execute_read(false);
 }
 
 static NOINLINE void read_rest(const char *rest)
@@ -135,21 +118,14 @@ static status_t command_one_shot(const char *rest)
 {
     motion_syntax_begin(&ahead, 'm', &session);
     read_rest(rest);
-    const status_t status = motion_syntax_end(&ahead);
-    if (status != STATUS_OK) {
-        return status;
-    }
-    return queue_preempt_with(ahead.command.count == 0 ? QUEUE_CONTINUOUS : QUEUE_ONE_SHOT, &ahead.command);
+    return execute_read(true);
 }
 
 /* x leaves a program mode; x<position> executes an entry. */
 static status_t command_xref(const char *rest)
 {
-    if (!more(*rest)) {
-        return STATUS_OK;
-    }
-    const status_t status = read_only_number(rest, &positions);
-    return status == STATUS_OK ? queue_preempt(number_8()) : status;
+    const status_t status = read_only_number(rest, RANGE_POSITION);
+    return status == STATUS_OK ? queue_preempt(number_8()) : optional(status);
 }
 
 static status_t command_run_array(const char *rest)
@@ -177,13 +153,13 @@ static status_t command_program_array(const char *rest)
 /* In that mode: <entry>,<position>. */
 static NOINLINE status_t program_array(const char *line)
 {
-    status_t status = read_number(line, &array_entries);
+    status_t status = read_number(line, RANGE_ENTRY);
     const uint8_t entry = number_8();
-    if (status == STATUS_OK && *behind_number != ',') {
+    if (status == STATUS_OK && *ahead.behind != ',') {
         status = STATUS_SYNTAX;
     }
     if (status == STATUS_OK) {
-        status = read_only_number(behind_number + 1, &array_entries);
+        status = read_only_number(ahead.behind + 1, RANGE_ENTRY);
     }
     if (status == STATUS_OK) {
         status = queue_array_set(entry, number_8());
@@ -197,34 +173,31 @@ static NOINLINE status_t program_array(const char *line)
 /* l ends, l<passes> runs the array. */
 static status_t command_loop(const char *rest)
 {
-    if (!more(*rest)) {
-        queue_loop_end();
-        return STATUS_OK;
+    const status_t status = read_only_number(rest, RANGE_COUNT);
+    if (status == STATUS_OK) {
+        return queue_array_run(number_16());
     }
-    const status_t status = read_only_number(rest, &counts);
-    return status == STATUS_OK ? queue_array_run(number_16()) : status;
+    if (status == STATUS_NUMBER_MISSING) {
+        queue_loop_end();
+    }
+    return optional(status);
 }
 
 /* ls and lf */
 static status_t command_loop_bound(const char *rest)
 {
     const queue_bound_t bound = (rest[-1] | 0x20) == 's' ? QUEUE_LOOP_START : QUEUE_LOOP_FINISH;
-    const status_t status = read_only_number(rest, &positions);
+    const status_t status = read_only_number(rest, RANGE_POSITION);
     return status == STATUS_OK ? queue_loop_bound(bound, number_8()) : status;
 }
 
 static status_t command_loop_passes(const char *rest)
 {
-    uint16_t passes = 0;
-    if (more(*rest)) {
-        const status_t status = read_only_number(rest, &counts);
-        if (status != STATUS_OK) {
-            return status;
-        }
-        passes = number_16();
+    const status_t status = optional(read_only_number(rest, RANGE_COUNT));
+    if (status == STATUS_OK) {
+        queue_loop_passes(number_16());
     }
-    queue_loop_passes(passes);
-    return STATUS_OK;
+    return status;
 }
 
 static status_t command_loop_all(const char *rest)
@@ -253,16 +226,16 @@ static status_t command_clear_queue(const char *rest)
 /* q<position>...: an entry is edited, or with nothing more shown. */
 static status_t command_edit(const char *rest)
 {
-    status_t status = read_number(rest, &positions);
+    status_t status = read_number(rest, RANGE_POSITION);
     const uint8_t position = number_8();
     if (status != STATUS_OK) {
         return status;
     }
-    if (!more(*behind_number)) {
+    if (!motion_syntax_more(*ahead.behind)) {
         return display_request((display_t)(DISPLAY_ROW + position));
     }
     motion_syntax_begin_edit(&ahead, queue_entry(position));
-    read_rest(behind_number);
+    read_rest(ahead.behind);
     status = motion_syntax_end(&ahead);
     if (status == STATUS_OK) {
         queue_edit(position, &ahead.command);
@@ -272,8 +245,8 @@ static status_t command_edit(const char *rest)
 
 static status_t command_configure(const char *rest)
 {
-    if (more(*rest)) {
-        return configure_set(rest);
+    if (motion_syntax_more(*rest)) {
+        return configure_set(&ahead, rest);
     }
     return enter(MODE_CONFIGURE, DISPLAY_CONFIGURE);
 }
@@ -355,32 +328,33 @@ static status_t command_debug(const char *rest)
 
 static status_t command_ramp(const char *rest)
 {
-    if (!more(*rest)) {
-        return STATUS_OK; /* neither 0 nor 1: no change (A-SYS-02) */
-    }
-    const status_t status = read_only_number(rest, &flags);
+    const status_t status = read_only_number(rest, RANGE_FLAG);
     if (status == STATUS_OK) {
         session_set_linear(number_8());
     }
-    return status;
+    return optional(status); /* neither 0 nor 1: no change (A-SYS-02) */
 }
 
 /* $O, $H, $K: soft ops 0 or 1; CRC and acknowledgements off with 0, and on with anything else. */
 static status_t command_option(const char *rest)
 {
     const char letter = rest[-1];
-    bool on = true;
-    if (more(*rest)) {
-        const status_t status = read_only_number(rest, letter == 'O' ? &flags : &counts);
-        if (status != STATUS_OK) {
-            return status;
-        }
-        on = number_16() != 0;
-    } else if (letter == 'O') {
-        return STATUS_OK;
+    uint8_t option = SESSION_SOFT_OPS;
+    uint8_t range = RANGE_FLAG;
+    if (letter != 'O') {
+        option = letter == 'H' ? SESSION_CRC : SESSION_ACK;
+        range = RANGE_COUNT;
     }
-    session_set_option(letter == 'O' ? SESSION_SOFT_OPS : letter == 'H' ? SESSION_CRC : SESSION_ACK, on);
-    return STATUS_OK;
+    status_t status = read_only_number(rest, range);
+    uint8_t on = number_16() != 0;
+    if (status == STATUS_NUMBER_MISSING && letter != 'O') {
+        status = STATUS_OK;
+        on = 1;
+    }
+    if (status == STATUS_OK) {
+        session_set_option(option, on);
+    }
+    return optional(status);
 }
 
 /* $F, $P, $U */
@@ -454,7 +428,7 @@ static status_t dispatch(const char *line)
             continue;
         }
         status = STATUS_SYNTAX;
-        if (second >= ARGUMENT_REST || !more(*rest)) {
+        if (second >= ARGUMENT_REST || !motion_syntax_more(*rest)) {
             const void *action = flash_pointer(&row->action);
             if ((uintptr_t)action < DISPLAYS) {
                 return display_request((display_t)(uintptr_t)action);
@@ -494,18 +468,18 @@ void commands_read_ahead(const char *line, uint8_t length)
 /* By the table. */
 static status_t execute_by_table(const char *line)
 {
-    if (!more(line[0])) {
+    if (!motion_syntax_more(line[0])) {
         return STATUS_OK;
     }
     if (mode != MODE_COMMANDS) {
-        const bool alone = !more(line[1]);
+        const bool alone = !motion_syntax_more(line[1]);
         const char letter = line[0] | 0x20;
         if (alone && letter == 'x') {
             mode = MODE_COMMANDS;
             return STATUS_OK;
         }
         if (mode == MODE_CONFIGURE && (!alone || line[0] != 'S')) {
-            return configure_line(line);
+            return configure_line(&ahead, line);
         }
         if (!alone || (letter != 's' && letter != 'q' && letter != '?')) { /* nothing that would move the motor */
             return mode == MODE_QUEUE ? command_edit(line) : program_array(line);
@@ -527,19 +501,9 @@ NOINLINE status_t commands_execute(const char *line, uint8_t length)
     characters_ahead = 0;
     /* What was read ahead without an error needs no search: time counts. (vd is an error there.) */
     if (characters != 0 && ahead.status == STATUS_OK) {
-        return command_read_ahead(line);
+        return execute_read(false);
     }
     return execute_by_table(line);
-}
-
-const char *commands_refused_range(void)
-{
-    return ahead.range;
-}
-
-void commands_refuse_range(const char *range)
-{
-    ahead.range = range;
 }
 
 bool commands_at_once(char character)
@@ -553,7 +517,7 @@ bool commands_at_once(char character)
 
 const char *commands_prompt(void)
 {
-    return mode == MODE_QUEUE ? FLASH_TEXT("Q>") : mode == MODE_ARRAY ? FLASH_TEXT("X>") : FLASH_TEXT("SAC>");
+    return flash_text(FLASH_TEXT("SAC>\0Q>\0X>\0SAC>"), mode);
 }
 
 bool commands_debugging(void)

@@ -21,10 +21,6 @@ void commands_read_ahead(const char *line, uint8_t length);
 /* Executes a line; a blank one, or one that begins with a space, does nothing. */
 status_t commands_execute(const char *line, uint8_t length);
 
-/* The range that the last STATUS_RANGE referred to, in flash. */
-const char *commands_refused_range(void);
-void commands_refuse_range(const char *range);
-
 /* + and -: whether this character, first on a line, is a command of its own. Executes it if so. */
 bool commands_at_once(char character);
 

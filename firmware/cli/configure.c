@@ -2,9 +2,9 @@
 #include <stddef.h>
 #include "base/flash.h"
 #include "base/inline.h"
-#include "base/number.h"
 #include "cli/commands.h"
 #include "cli/display.h"
+#include "cli/range.h"
 #include "cli/terminal_port.h"
 #include "cli/text.h"
 #include "eeprom/eeprom_port.h"
@@ -12,19 +12,6 @@
 #include "settings.h"
 
 /* -- the table -------------------------------------------------------------------------------------------------------- */
-
-enum {
-#define SETTING_KIND(kind, range) KIND_##kind,
-#include "settings.def"
-#undef SETTING_KIND
-};
-
-/* One after the other, each with its NUL. */
-static const char ranges[] FLASH =
-#define SETTING_KIND(kind, range) range "\0"
-#include "settings.def"
-#undef SETTING_KIND
-    ;
 
 /* Bytes, one row behind the other. A pointer to a row is to its letter; these follow. */
 enum { ROW_PLACE = 1, ROW_KIND, ROW_NAME };
@@ -46,19 +33,11 @@ static const struct {
 } rows FLASH = {
 #define SETTING(letter, type, member, kind, factory, name) \
     {letter, offsetof(settings_t, SETTING_PLACE_##type(member)) | (SETTING_BYTES_##type - 1) << PLACE_MORE_BIT, \
-     KIND_##kind, name},
+     RANGE_##kind, name},
 #include "settings.def"
 #undef SETTING
     '\0',
 };
-
-/* Behind the NUL. */
-static NOINLINE const char *next_text(const char *text)
-{
-    while (flash_u8(text++) != '\0') {
-    }
-    return text;
-}
 
 /* The letter's row, in flash; 0: there is none. */
 static NOINLINE const char *find(uint8_t letter)
@@ -72,103 +51,52 @@ static NOINLINE const char *find(uint8_t letter)
         if (its_letter == '\0') {
             return 0;
         }
-        row = next_text(row + ROW_NAME);
+        row = flash_text(row + ROW_NAME, 1);
     }
 }
 
 /* -- values that are typed -------------------------------------------------------------------------------------------- */
 
-static bool is_end(char c)
+NOINLINE status_t configure_set(motion_syntax_t *number, const char *text)
 {
-    return c == '\0' || c == ' ';
-}
-
-NOINLINE status_t configure_set(const char *text)
-{
-    enum { NO_POINT = 0x80 };
-    const char *row = find((uint8_t)*text);
+    const char *row = find((uint8_t)*text++);
     if (row == 0) {
         return STATUS_UNKNOWN_COMMAND;
     }
     const uint8_t kind = flash_u8(row + ROW_KIND);
     uint8_t place = flash_u8(row + ROW_PLACE);
-    const char *range = ranges;
-    for (uint8_t i = kind; i > 0; i--) {
-        range = next_text(range);
-    }
-    commands_refuse_range(range); /* told with STATUS_RANGE only */
-    if (kind == KIND_MAP) {
-        const uint8_t entry = (uint8_t)(*++text - '0');
+    if (kind == RANGE_MAP) {
+        const uint8_t entry = (uint8_t)(*text++ - '0');
         if (entry > 7) {
-            return STATUS_RANGE;
+            return range_refuse(RANGE_MAP);
         }
         place = (uint8_t)(place + entry);
     }
-
-    /* The number: of a ramp value, the places behind its point are counted. */
-    uint32_t value = 0;
-    uint8_t places = NO_POINT;
-    uint8_t c;
-    while (!is_end((char)(c = (uint8_t)*++text))) {
-        c = (uint8_t)(c - '0');
-        if (c < 10 && places != 2) {
-            if (!number_add_digit(&value, c)) {
-                return STATUS_NUMBER_TOO_LARGE;
-            }
-            places++;
-        } else if (c == (uint8_t)('.' - '0') && kind == KIND_RAMP && places >= NO_POINT) {
-            places = 0;
-        } else {
-            return STATUS_SYNTAX;
+    status_t status = motion_syntax_number(number, text, kind == RANGE_RAMP);
+    if (status != STATUS_OK) {
+        return status;
+    }
+    if (motion_syntax_more(*number->behind)) {
+        return STATUS_SYNTAX;
+    }
+    if (kind == RANGE_RAMP) {
+        const accel_code_t code = motion_syntax_ramp(number);
+        if (code == 0) {
+            return range_refuse(kind);
+        }
+        number->value = code;
+    } else {
+        status = range_check(number, kind);
+        if (status != STATUS_OK && kind > RANGE_AUTORUN) {
+            return status;
         }
     }
-    if (places == NO_POINT) {
-        return STATUS_NUMBER_MISSING;
-    }
-
-    /* The limits stand in the text: of a ramp value, 1 hundredth and 999 wholes. */
-    uint16_t least = 0;
-    uint32_t most = 0;
-    while ((c = flash_u8(range++)) != '\0') {
-        c = (uint8_t)(c - '0');
-        if (c < 10) {
-            number_add_digit(&most, c);
-        } else if ((uint16_t)most != 0) {
-            least = (uint16_t)most;
-            most = 0;
-        }
-    }
-    uint16_t to_code = 0;
-    if (kind == KIND_RAMP) {
-        if (places < NO_POINT || value < 100) {
-            if (places >= NO_POINT) {
-                places = 0;
-            }
-            for (; places < 2; places++) {
-                number_add_digit(&value, 0); /* if there is no room for it it is out of range anyway */
-            }
-            most = ACCEL_CODE_WHOLE - 1;
-        } else {
-            to_code = ACCEL_CODE_WHOLE - 100;
-        }
-    } else if (kind == KIND_OPS && value != 0) {
-        least = (uint16_t)most;
-    }
-    if (value > most) {
-        if (kind > KIND_AUTORUN) {
-            return STATUS_RANGE;
-        }
-        value = most;
-    }
-    if (value < least) {
-        return STATUS_RANGE;
-    }
-    return store_change(place & PLACE_OFFSET, place >> PLACE_MORE_BIT, value + to_code);
+    return store_change(place & PLACE_OFFSET, place >> PLACE_MORE_BIT, number->value);
 }
 
-status_t configure_line(const char *line)
+status_t configure_line(motion_syntax_t *number, const char *line)
 {
-    const status_t status = configure_set(line);
+    const status_t status = configure_set(number, line);
     if (status == STATUS_OK) {
         (void)display_request(DISPLAY_CONFIGURE); /* it is stored, even if there is no room for one more display */
     }
@@ -188,39 +116,43 @@ void configure_first_cell(bool screen)
 
 NOINLINE bool configure_has_cell(void)
 {
-    return cell != SCREEN_END && cell != BYTES_END && (cell != LIST_END || commands_debugging());
+    const uint16_t next = cell;
+    if (next == LIST_END) {
+        return commands_debugging();
+    }
+    return next != SCREEN_END && next != BYTES_END;
 }
 
-static void put_value(const char *row)
+/* The lowest byte of the value, which decides what is shown of it; the whole value to `value`. */
+static uint8_t read_value(uint8_t place, uint32_t *value)
 {
-    const uint8_t place = flash_u8(row + ROW_PLACE);
-    const uint8_t kind = flash_u8(row + ROW_KIND);
-    uint8_t offset = place & PLACE_OFFSET;
     uint8_t more = place >> PLACE_MORE_BIT;
-    uint32_t value = 0;
-    uint8_t *byte = (uint8_t *)&value;
-    do {
-        *byte++ = store_setting(offset++);
-    } while (more-- > 0);
-    uint8_t lowest = (uint8_t)value;
-    if (kind == KIND_DIRECTION) {
+    for (;;) {
+        const uint8_t byte = store_setting((uint8_t)((place & PLACE_OFFSET) + more));
+        *value = *value << 8 | byte;
+        if (more-- == 0) {
+            return byte;
+        }
+    }
+}
+
+static void put_value(uint8_t kind, uint8_t offset, uint32_t value)
+{
+    const uint8_t lowest = (uint8_t)value;
+    if (kind == RANGE_DIRECTION) {
         const char *text = FLASH_TEXT("CCW");
         if (lowest == 0) {
             text++;
         }
         text_put_flash(text);
-    } else if (kind == KIND_MAP) {
-        for (uint8_t left = 7;; left--) {
-            terminal_port_put((uint8_t)('0' + lowest));
-            if (left == 0) {
-                break;
-            }
-            lowest = store_setting(offset++);
+    } else if (kind == RANGE_MAP) {
+        for (uint8_t left = 8; left > 0; left--) {
+            terminal_port_put((uint8_t)('0' + store_setting(offset++)));
         }
-    } else if (kind == KIND_RAMP) {
+    } else if (kind == RANGE_RAMP) {
         display_put_accel((accel_code_t)value);
     } else {
-        if (kind == KIND_OPS && lowest != 0) {
+        if (kind == RANGE_OPS && lowest != 0) {
             value = 100100; /* in binary; there is no other */
         }
         text_put_u32(value);
@@ -238,31 +170,29 @@ static void put_byte(uint16_t address)
     const uint8_t byte = eeprom_port_read(address);
     put_hex_digit(byte >> 4);
     put_hex_digit(byte & 0x0F);
-    if ((address & 0x0F) == 0x0F) {
+    if ((uint8_t)(address + 1) % 16 == 0) {
         text_new_line();
     } else {
         terminal_port_put(' ');
     }
 }
 
-/* The name and the tabs behind it: values stand in column 16, or 40. */
-static void put_name(const char *name)
+/* The name and the tabs behind it: values stand in column 16, or 40. Returns the length of the name. */
+static uint8_t put_name(const char *name)
 {
-    uint8_t column = 1;
-    for (uint8_t c; (c = flash_u8(name++)) != '\0'; column++) {
-        if (column == 1) {
-            terminal_port_put(' ');
-        }
-        terminal_port_put(c);
+    if (flash_u8(name) != '\0') {
+        terminal_port_put(' ');
     }
+    const uint8_t length = text_put_flash(name);
     terminal_port_put('\t');
-    if (column < 7) {
+    if (length < 6) {
         terminal_port_put('\t');
     }
+    return length;
 }
 
 /* A letter without a parameter has an empty cell. */
-void configure_put_cell(void)
+NOINLINE void configure_put_cell(void)
 {
     const uint16_t at = cell++;
     if (at >= LIST_END) {
@@ -271,31 +201,35 @@ void configure_put_cell(void)
     }
     const bool screen = at < SCREEN_END;
     uint8_t letter = (uint8_t)at;
-    bool right = false; /* the end of a line */
+    uint8_t ends = 0; /* the line */
     if (screen) {
-        right = letter & 1;
+        ends = letter & 1;
         letter = (uint8_t)((letter >> 1) + 'A');
-        if (right) {
+        if (ends) {
             letter |= 0x20;
         }
     }
     const char *row = find(letter);
     if (row != 0) {
-        if (right) {
+        if (ends) {
             terminal_port_put('\t');
         }
         terminal_port_put(letter);
+        uint8_t shown = 1;
         if (screen) {
-            put_name(row + ROW_NAME);
+            shown = put_name(row + ROW_NAME);
         } else {
             terminal_port_put(' ');
-            right = true;
+            ends = 1;
         }
-        if (!screen || letter != 'D' || store_setting(flash_u8(row + ROW_PLACE)) != 0) {
-            put_value(row);
+        const uint8_t place = flash_u8(row + ROW_PLACE);
+        uint32_t value = 0;
+        shown |= read_value(place, &value); /* what has no name is shown if it is not 0 */
+        if (shown) {
+            put_value(flash_u8(row + ROW_KIND), place & PLACE_OFFSET, value);
         }
     }
-    if (right) {
+    if (ends) {
         text_new_line();
     }
 }

@@ -12,12 +12,13 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include "base/status.h"
+#include "cli/motion_syntax.h"
 
-/* <letter><value> is stored. */
-status_t configure_set(const char *text);
+/* <letter><value> is stored; number: to read it with. */
+status_t configure_set(motion_syntax_t *number, const char *text);
 
 /* The same as a line of the configure mode: the screen is shown anew. */
-status_t configure_line(const char *line);
+status_t configure_line(motion_syntax_t *number, const char *line);
 
 /* The cells of the screen, or of the list of $E, one after the other: at most TEXT_PIECE_BYTES each. */
 void configure_first_cell(bool screen);

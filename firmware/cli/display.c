@@ -13,7 +13,7 @@
 #include "queue/session.h"
 #include "settings.h"
 
-static struct {
+static struct shown {
     const char *text;      /* in flash: what is still to come of the present text; 0: nothing is printed */
     uint8_t ruled;         /* how many signs of a rule have been printed */
     uint8_t row;           /* of the queue */
@@ -24,6 +24,13 @@ static struct {
                         * and debug mode were on */
 } shown;
 
+static inline struct shown *self(void)
+{
+    struct shown *s = &shown;
+    NEAR(s);
+    return s;
+}
+
 #define SHOWN_GAP (1u << 3)
 #define SHOWN_DEBUG (1u << 4)
 _Static_assert(((SHOWN_GAP | SHOWN_DEBUG) & (SESSION_SOFT_OPS | SESSION_CRC | SESSION_ACK)) == 0,
@@ -33,25 +40,25 @@ _Static_assert(((SHOWN_GAP | SHOWN_DEBUG) & (SESSION_SOFT_OPS | SESSION_CRC | SE
 
 /* Characters of a text that stand for a value: print_field() knows them by the names below, in the same order. The
  * first ones are of a row of the queue, or of a command with the session's defaults. */
-#define COUNT "\x80"
-#define RPM "\x81"
-#define CYCLE "\x82"
-#define ACCEL "\x83"
-#define DECEL "\x84"
-#define EXTRA "\x85"
-#define WAIT "\x86"
-#define ROW "\x87"
-#define NEXT "\x88"
-#define EXECUTING "\x89"
-#define VELOCITY "\x8A"
-#define POSITION "\x8B"
-#define STATE "\x8C"
-#define FAULTS "\x8D"
-#define ENTRY "\x8E"
-#define SETTING_CELL "\x8F"
-#define OPS "\x90"
+#define COUNT "\013"
+#define RPM "\014"
+#define CYCLE "\015"
+#define ACCEL "\016"
+#define DECEL "\017"
+#define EXTRA "\020"
+#define WAIT "\021"
+#define ROW "\022"
+#define NEXT "\023"
+#define EXECUTING "\024"
+#define VELOCITY "\025"
+#define POSITION "\026"
+#define STATE "\027"
+#define FAULTS "\030"
+#define ENTRY "\031"
+#define SETTING_CELL "\032"
+#define OPS "\033"
 enum {
-    FIELD_COUNT = 0x80,
+    FIELD_COUNT = 013,
     FIELD_RPM,
     FIELD_CYCLE,
     FIELD_ACCEL,
@@ -68,11 +75,12 @@ enum {
     FIELD_ENTRY,
     FIELD_SETTING_CELL,
     FIELD_OPS,
+    FIELDS_END,
 };
 
 /* A choice between two texts: the first one if the command has the flag, or from CHOICE_OPTION on the session the option,
  * that is in the lowest bits of the character. */
-#define CHOICE(flag, set, clear) flag set "\xA0" clear "\xA1"
+#define CHOICE(flag, set, clear) flag set "\001" clear "\002"
 #define CCW "\xC1"
 #define PULSES "\xC2"
 #define LINEAR "\xC4"
@@ -83,55 +91,30 @@ enum {
 #define ACK "\xE4"
 #define GAP "\xE8"
 #define DEBUG "\xF0"
-enum { CHOICE_ELSE = 0xA0, CHOICE_END = 0xA1, CHOICE_BEGIN = 0xC0, CHOICE_OPTION = 0xE0, CHOICE_BITS = 0x1F };
+enum { CHOICE_ELSE = 1, CHOICE_END = 2, CHOICE_BEGIN = 0xC0, CHOICE_OPTION = 0xE0, CHOICE_BITS = 0x1F };
 _Static_assert(MOTION_CCW == 0x01 && MOTION_PULSES == 0x02 && MOTION_LINEAR == 0x04 && MOTION_SYNC == 0x08 &&
                    SESSION_SOFT_OPS == 0x01 && SESSION_CRC == 0x02 && SESSION_ACK == 0x04 && SHOWN_GAP == 0x08 &&
                    SHOWN_DEBUG == 0x10,
                "the flags stand in the characters");
 
 /* Where a row ends; next_row() says how it goes on. */
-#define NEXT_ROW "\xA2"
-enum { TEXT_NEXT_ROW = 0xA2 };
-
-/* In these texts a line ends with LF; it is sent as CR LF. */
+#define NEXT_ROW "\003"
+enum { TEXT_NEXT_ROW = 3 };
 
 /* A rule of 70 signs of equality. */
 #define RULE "=\n"
 enum { RULE_CHARACTERS = 70 };
 
-/* The queue: template of annex E, tab stops of 8. */
-#define QUEUE_HEAD "Q\tSteps\t\tRPM\tCycle\t Acc\tDec\tusteps\t deltaT\n" RULE NEXT_ROW
-/* clang-format off */
-static const char queue_text[] FLASH = QUEUE_HEAD
-    ROW "\t" COUNT "\t" CHOICE(PULSES, "+", " ") CHOICE(CCW, "CCW", "CW") "\t" RPM "\t" CYCLE
-    "\t" CHOICE(LINEAR, "*", " ") ACCEL "\t" DECEL "\t" EXTRA "\t" CHOICE(SYNC, "s", " ") " " WAIT "\n" NEXT_ROW
-    RULE "Q is at " NEXT "\t+ pulse\t\t\t* linear\t\ts sync\n"
-    CHOICE(DEBUG, "executing " EXECUTING "\n", "");
-/* clang-format on */
-/* clang-format off */
-static const char defaults_text[] FLASH =
-    "v " RPM " cycle " CYCLE "\n"
-    "a " ACCEL " d " DECEL " " CHOICE(LINEAR, "linear", "harmonic") "\n"
-    "GAP " CHOICE(GAP, "on", "off") ", " CHOICE(PULSES, "pulses", "full step") ", " CHOICE(THROTTLE, "EnT", "EnF") "\n"
-    "ops " OPS ", soft_ops " CHOICE(SOFT_OPS, "on", "off") ", CRC " CHOICE(CRC, "1", "0")
-    ", ACK " CHOICE(ACK, "on", "off") "\n";
-/* clang-format on */
-
-static const char array_text[] FLASH = "x_ " ROW " " ENTRY "\n" NEXT_ROW;
-static const char configure_text[] FLASH = "Config:\n" NEXT_ROW;
-static const char cell_text[] FLASH = SETTING_CELL NEXT_ROW;
-static const char velocity_text[] FLASH = VELOCITY "\n";
-static const char position_text[] FLASH = "position " POSITION " " STATE " faults " FAULTS "\n";
+#define DISPLAY_TEXT(name, text) static const char name[] FLASH = text;
+#include "cli/display.def"
+#undef DISPLAY_TEXT
 
 /* What each display begins with. */
 static const char *const texts[] FLASH = {
-    [DISPLAY_QUEUE] = queue_text,       [DISPLAY_DEFAULTS] = defaults_text, [DISPLAY_VELOCITY] = velocity_text,
+    [DISPLAY_QUEUE] = queue_head,       [DISPLAY_DEFAULTS] = defaults_text, [DISPLAY_VELOCITY] = velocity_text,
     [DISPLAY_POSITION] = position_text, [DISPLAY_HELP] = commands_help,
     [DISPLAY_ARRAY] = array_text,       [DISPLAY_CONFIGURE] = configure_text, [DISPLAY_EEPROM] = cell_text,
 };
-
-/* Indexed by motion_state_t. */
-static const char state_words[][8] FLASH = {"STANDBY", "ACCEL", "CRUISE", "DECEL", "STOP"};
 
 /* -- printing --------------------------------------------------------------------------------------------------------- */
 
@@ -174,7 +157,7 @@ static void print_field(uint8_t field, const motion_command_t *command)
         break;
     case FIELD_OPS: number = settings.ops_mask; break;
     case FIELD_SETTING_CELL: configure_put_cell(); return;
-    case FIELD_STATE: text_put_flash(state_words[engine_state()]); return;
+    case FIELD_STATE: text_put_flash(flash_text(state_words, engine_state())); return;
     case FIELD_ENTRY: number = queue_array(shown.row); break;
     default: number = engine_faults(); break;
     }
@@ -183,27 +166,28 @@ static void print_field(uint8_t field, const motion_command_t *command)
 
 static void begin(uint8_t display)
 {
-    shown.current = display;
+    struct shown *const s = self();
+    s->current = display;
     if (display > DISPLAY_ROW) {
-        shown.row = (uint8_t)(display - DISPLAY_ROW);
-        shown.text = queue_text + sizeof QUEUE_HEAD - 1;
+        s->row = (uint8_t)(display - DISPLAY_ROW);
+        s->text = queue_text;
         return;
     }
-    shown.text = flash_pointer(&texts[display]);
-    shown.row = 0;
+    s->text = flash_pointer(&texts[display]);
+    s->row = 0;
     configure_first_cell(display == DISPLAY_CONFIGURE);
-    shown.session = session;
+    s->session = session;
     if (engine_gap()) {
-        shown.session.options |= SHOWN_GAP;
+        s->session.options |= SHOWN_GAP;
     }
     if (commands_debugging()) {
-        shown.session.options |= SHOWN_DEBUG;
+        s->session.options |= SHOWN_DEBUG;
         if (display == DISPLAY_QUEUE) {
-            shown.row = UINT8_MAX; /* positions 0 and 31 are shown in debug mode only */
+            s->row = UINT8_MAX; /* positions 0 and 31 are shown in debug mode only */
         }
     }
     if (encoder_throttles()) {
-        shown.session.flags |= MOTION_CCW;
+        s->session.flags |= MOTION_CCW;
     }
 }
 
@@ -220,7 +204,7 @@ static void next_display(void)
     }
 }
 
-static NOINLINE uint8_t last_row(void)
+static uint8_t last_row(void)
 {
     return shown.session.options & SHOWN_DEBUG ? QUEUE_ONE_SHOT : QUEUE_LAST;
 }
@@ -230,7 +214,7 @@ static const char *next_row(const char *behind_it)
 {
     const uint8_t before = shown.row++;
     if (shown.current == DISPLAY_QUEUE) {
-        return shown.row <= last_row() ? queue_text + sizeof QUEUE_HEAD - 1 : behind_it;
+        return shown.row <= last_row() ? queue_text : behind_it;
     }
     if (shown.current == DISPLAY_ARRAY && before < QUEUE_ARRAY - 1 && queue_array(before) != 0) {
         return array_text;
@@ -254,18 +238,18 @@ static void print_piece(void)
     motion_command_t defaults; /* or a row of the queue: the command whose values are shown */
     const motion_command_t *command = &defaults;
     session_template(&shown.session, &defaults);
-    if (shown.current > DISPLAY_ROW || (shown.current == DISPLAY_QUEUE && shown.row <= last_row())) {
-        command = queue_entry(shown.row);
+    if (shown.current > DISPLAY_ROW || shown.current == DISPLAY_QUEUE) {
+        command = queue_entry(shown.row % QUEUE_POSITIONS); /* (also behind the last row, where no field is of a row) */
     }
     const char *text = shown.text;
-    for (uint8_t room = TEXT_PIECE_BYTES - 1; room > 0; room--) { /* a line's end are two */
+    for (uint8_t put = 0; put < TEXT_PIECE_BYTES - TEXT_LONGEST;) {
         const uint8_t character = flash_u8(text);
         if (character == '\0') {
             next_display();
             return;
         }
-        if (character >= FIELD_COUNT && character < CHOICE_ELSE) {
-            if (room == TEXT_PIECE_BYTES - 1) {
+        if (character >= FIELD_COUNT && character < FIELDS_END) {
+            if (put == 0) {
                 shown.text = text + 1;
                 print_field(character, command);
                 return;
@@ -283,15 +267,16 @@ static void print_piece(void)
         if (character == CHOICE_ELSE) {
             text = behind(text, CHOICE_END);
         } else if (character >= CHOICE_BEGIN) {
-            const uint8_t bits = character >= CHOICE_OPTION ? shown.session.options : command->flags;
-            if (!(uint8_t)(bits & character & CHOICE_BITS)) {
+            uint8_t bits = character >= CHOICE_OPTION ? shown.session.options : command->flags;
+            bits = (uint8_t)(bits & character & CHOICE_BITS);
+            if (bits == 0) {
                 text = behind(text, CHOICE_ELSE);
             }
         } else if (character == '\n') {
             text_new_line();
             break;
         } else if (character != CHOICE_END) {
-            terminal_port_put(character);
+            put = (uint8_t)(put + text_put(character));
         }
     }
     shown.text = text;
@@ -306,14 +291,15 @@ void display_init(void)
 
 status_t display_request(display_t display)
 {
-    if (shown.text == 0) {
+    struct shown *const s = self();
+    if (s->text == 0) {
         begin(display);
         return STATUS_OK;
     }
-    if (shown.waiting_count == DISPLAY_WAITING) {
+    if (s->waiting_count == DISPLAY_WAITING) {
         return STATUS_BUSY;
     }
-    shown.waiting[shown.waiting_count++] = display;
+    s->waiting[s->waiting_count++] = display;
     return STATUS_OK;
 }
 

@@ -1,5 +1,4 @@
 #include "cli/line.h"
-#include "base/inline.h"
 
 enum { BACKSPACE = 0x08, LINE_FEED = 0x0A, CARRIAGE_RETURN = 0x0D, ESCAPE = 0x1B, SPACE = 0x20, DELETE = 0x7F };
 
@@ -26,7 +25,6 @@ static line_event_t append(line_t *line, char character)
 
 line_event_t line_take(line_t *line, uint8_t byte)
 {
-    NEAR(line);
     const uint8_t last = line->last;
     line->last = byte;
 

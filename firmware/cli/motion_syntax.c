@@ -2,6 +2,7 @@
 #include "base/flash.h"
 #include "base/inline.h"
 #include "base/number.h"
+#include "cli/range.h"
 #include "motion/engine.h"
 #include "settings.h"
 
@@ -61,10 +62,6 @@ enum {
     EDITS = 1 << 5, /* an entry of the queue: what is not given stays as it is */
 };
 
-const char motion_syntax_range_flag[] FLASH = "0..1";
-static const char range_byte[] FLASH = "0..255";
-static const char range_ramp[] FLASH = "0.01..999";
-
 /* Which of these bits the number being read has. */
 static inline uint8_t has(const motion_syntax_t *syntax, uint8_t bits)
 {
@@ -77,10 +74,9 @@ static void refuse(motion_syntax_t *syntax, status_t status)
     syntax->status = status;
 }
 
-static NOINLINE void refuse_range(motion_syntax_t *syntax, const char *range)
+static void refuse_range(motion_syntax_t *syntax, uint8_t range)
 {
-    syntax->status = STATUS_RANGE;
-    syntax->range = range;
+    syntax->status = range_refuse(range);
 }
 
 static NOINLINE void open_parameter(motion_syntax_t *syntax, uint8_t parameter)
@@ -88,29 +84,40 @@ static NOINLINE void open_parameter(motion_syntax_t *syntax, uint8_t parameter)
     syntax->parameter = parameter;
     syntax->value = 0;
     syntax->number = flash_u8(&parameter_number[parameter]);
-    syntax->places = 0;
+    syntax->places = MOTION_SYNTAX_NO_POINT;
+}
+
+NOINLINE accel_code_t motion_syntax_ramp(const motion_syntax_t *syntax)
+{
+    NEAR(syntax);
+    uint16_t code = (uint16_t)syntax->value;
+    if (syntax->value >= ACCEL_CODE_WHOLE) {
+        return 0;
+    }
+    uint8_t places = syntax->places;
+    if (places == MOTION_SYNTAX_NO_POINT) {
+        if (code >= 100) {
+            code = (uint16_t)(code + (ACCEL_CODE_WHOLE - 100));
+            return code <= ACCEL_NONE ? code : 0;
+        }
+        places = 0;
+    }
+    for (; places < 2; places++) {
+        if (code > 999) {
+            return 0;
+        }
+        code = (uint16_t)(code * 10u);
+    }
+    return code;
 }
 
 /* A ramp value: its code, or 0 for the system default, which resolve_ramp() puts in its place. */
 static void close_ramp(motion_syntax_t *syntax)
 {
-    const uint32_t value = syntax->value;
-    uint8_t places = syntax->places;
-    accel_code_t code = (accel_code_t)value; /* hundredths; below 10,000 if any place was taken */
-    if (places == 0 && value >= 100) {
-        if (value > 999) {
-            refuse_range(syntax, range_ramp);
-            return;
-        }
-        code = (accel_code_t)(code + (ACCEL_CODE_WHOLE - 100));
-    } else {
-        for (; places < 2; places++) {
-            code = (accel_code_t)(code * 10u);
-        }
-        if (code == 0 && (syntax->number & NOT_ZERO)) {
-            refuse_range(syntax, range_ramp); /* not 0 itself, but below 0.01 */
-            return;
-        }
+    const accel_code_t code = motion_syntax_ramp(syntax);
+    if (code == 0 && (syntax->number & NOT_ZERO)) {
+        refuse_range(syntax, RANGE_RAMP); /* not 0 itself */
+        return;
     }
     if (syntax->parameter == PARAMETER_ACCEL) {
         syntax->command.accel = code;
@@ -171,7 +178,7 @@ static NOINLINE void close_parameter(motion_syntax_t *syntax)
         break;
     case PARAMETER_EXTRA:
         if (value > UINT8_MAX) {
-            refuse_range(syntax, range_byte);
+            refuse_range(syntax, RANGE_BYTE);
             return;
         }
         command->extra_pulses = (uint8_t)value;
@@ -188,7 +195,7 @@ static NOINLINE void close_parameter(motion_syntax_t *syntax)
     }
     if (flag & (MOTION_LINEAR | MOTION_SYNC)) { /* 0 or 1, 1 without a number */
         if (value > 1) {
-            refuse_range(syntax, motion_syntax_range_flag);
+            refuse_range(syntax, RANGE_FLAG);
             return;
         }
         on = (uint8_t)value;
@@ -227,8 +234,10 @@ static void take_point(motion_syntax_t *syntax)
         return;
     }
     number |= HAS_POINT;
+    syntax->places = 0;
     if (!(number & DECIMALS) || syntax->value >= 100) {
         number |= NO_MORE;
+        syntax->places = MOTION_SYNTAX_NO_POINT;
     }
     syntax->number = number;
 }
@@ -353,9 +362,31 @@ status_t motion_syntax_end(motion_syntax_t *syntax)
         if (syntax->parameter >= PARAMETER_ACCEL) {
             return STATUS_OK; /* a or d */
         }
-        command->count = 1; /* the engine checks commands: is this velocity possible at all? */
+        *(uint8_t *)&command->count = 1; /* it was 0. The engine checks commands: is this velocity possible at all? */
     }
     return engine_check(command);
+}
+
+NOINLINE status_t motion_syntax_number(motion_syntax_t *syntax, const char *text, bool decimals)
+{
+    NEAR(syntax);
+    syntax->value = 0;
+    syntax->places = MOTION_SYNTAX_NO_POINT;
+    const char *const begin = text;
+    for (;; text++) {
+        const uint8_t c = (uint8_t)(*text - '0');
+        if (c == (uint8_t)('.' - '0') && decimals && syntax->places == MOTION_SYNTAX_NO_POINT) {
+            syntax->places = 0;
+        } else if (c > 9 || syntax->places == 2) {
+            break;
+        } else if (!number_add_digit(&syntax->value, c)) {
+            return STATUS_NUMBER_TOO_LARGE;
+        } else if (syntax->places < 2) {
+            syntax->places++;
+        }
+    }
+    syntax->behind = text;
+    return text != begin ? STATUS_OK : motion_syntax_more(*text) ? STATUS_SYNTAX : STATUS_NUMBER_MISSING;
 }
 
 void motion_syntax_keep(const motion_syntax_t *syntax, session_t *defaults)

@@ -24,21 +24,22 @@
 #include "queue/session.h"
 
 typedef struct {
-    motion_command_t command; /* what is read so far, on top of the session defaults */
+    union {
+        motion_command_t command; /* what is read so far, on top of the session defaults */
+        uint32_t limit;           /* of a number that is read instead of a command (cli/range.c) */
+    };
     uint32_t value;           /* of the number being read; hundredths of it if places is 2, tenths if 1 */
-    const char *range;        /* in flash: the range that STATUS_RANGE refers to */
+    const char *behind;       /* what follows the number that motion_syntax_number() has read */
     status_t status;          /* the first error */
     uint8_t parameter;        /* row of motion_parameters.def whose number is being read */
     uint8_t number;           /* bits: what the number being read consists of */
-    uint8_t places;           /* decimals taken into value */
+    uint8_t places;           /* decimals taken into value; 3: none, as there was no point that counts */
     uint8_t given;            /* bits: parameters that need a decision at the end */
     uint8_t single;           /* not 0: v, a or d alone, no second parameter may follow */
 } motion_syntax_t;
 
+#define MOTION_SYNTAX_NO_POINT 3   /* places */
 #define MOTION_SYNTAX_VELOCITY 1 /* single: v or vc */
-
-/* The range of what is either 0 or 1, in flash. */
-extern const char motion_syntax_range_flag[];
 
 /* Starts on the first letter: m, or v, a, d for the single commands. */
 void motion_syntax_begin(motion_syntax_t *syntax, char first_letter, const session_t *defaults);
@@ -53,6 +54,19 @@ void motion_syntax_take(motion_syntax_t *syntax, char character);
 
 /* The end of the line. STATUS_OK: syntax->command is complete and executable; with count 0 it is continuous motion. */
 status_t motion_syntax_end(motion_syntax_t *syntax);
+
+/* Instead of a command: the digits that text begins with, to value; with up to two decimals, a point alone is 0.
+ * STATUS_SYNTAX, NUMBER_MISSING, NUMBER_TOO_LARGE. */
+status_t motion_syntax_number(motion_syntax_t *syntax, const char *text, bool decimals);
+
+/* 0 at the end of a command: of the line, or a space. */
+static inline uint8_t motion_syntax_more(char c)
+{
+    return (uint8_t)(c & ~' ');
+}
+
+/* The code of the ramp value that has been read; 0 if it is none. */
+accel_code_t motion_syntax_ramp(const motion_syntax_t *syntax);
 
 /* What a complete command leaves as session defaults: all but count, direction, sync, start wait and extra pulses. */
 void motion_syntax_keep(const motion_syntax_t *syntax, session_t *defaults);

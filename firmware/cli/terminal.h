@@ -12,12 +12,12 @@
 #ifndef CLI_TERMINAL_H
 #define CLI_TERMINAL_H
 
-#include <stdbool.h>
+#include <stdint.h>
 #include "base/status.h"
 
 /* The port is ready: prints the version line. The first polls print what is reported, if not STATUS_OK, and the prompt. */
 void terminal_init(status_t reported);
 
-bool terminal_poll(void); /* takes a few bytes in, sends what is owed; true if it did anything */
+uint8_t terminal_poll(void); /* takes a few bytes in, sends what is owed; not 0 if it did anything */
 
 #endif

@@ -4,11 +4,32 @@
 #include "base/number.h"
 #include "cli/terminal_port.h"
 
-void text_put_flash(const char *text)
+/* What characters from 0x80 on stand for: a character, and one that may be such a pair again. */
+static const uint8_t pairs[][2] FLASH = {
+#define PAIR(first, second) {first, second},
+#include "cli/pairs.def"
+#undef PAIR
+};
+
+NOINLINE uint8_t text_put(uint8_t c)
 {
-    for (uint8_t c; (c = flash_u8(text)) != '\0'; text++) {
-        terminal_port_put(c);
+    uint8_t count = 1;
+    for (; c >= 0x80; count++) {
+        const uint8_t *pair = pairs[0] + (uint8_t)(c << 1);
+        terminal_port_put(flash_u8(pair));
+        c = flash_u8(pair + 1);
     }
+    terminal_port_put(c);
+    return count;
+}
+
+uint8_t text_put_flash(const char *text)
+{
+    uint8_t count = 0;
+    for (uint8_t c; (c = flash_u8(text)) != '\0'; text++) {
+        count = (uint8_t)(count + text_put(c));
+    }
+    return count;
 }
 
 void text_put_decimal(uint32_t value, uint8_t decimals)

@@ -9,7 +9,11 @@
 /* What is put at a time is no longer than this: whoever has room for so many may go on. */
 #define TEXT_PIECE_BYTES 24
 
-void text_put_flash(const char *text); /* in flash */
+/* A character of a text in flash: it may stand for up to TEXT_LONGEST (tools/pack_texts.py). Returns how many were put. */
+#define TEXT_LONGEST 4
+uint8_t text_put(uint8_t c);
+uint8_t text_put_flash(const char *text); /* in flash, packed or not; how many characters were put */
+
 void text_put_u32(uint32_t value);
 void text_put_decimal(uint32_t value, uint8_t decimals); /* as number_format() */
 void text_new_line(void);                                /* CR LF */

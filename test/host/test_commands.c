@@ -1,5 +1,6 @@
 /* cli/commands: the table, and what each command does. */
 #include "cli/commands.h"
+#include "cli/range.h"
 #include <string.h>
 #include "cli/display.h"
 #include "host/fakes/engine_fake.h"
@@ -275,7 +276,7 @@ static void test_each_wrong_line_is_refused_and_changes_nothing(void)
     assert_refused(STATUS_PERIOD_TOO_SHORT, "vc1");
     assert_refused(STATUS_VELOCITY_ZERO, "v0");
     assert_refused(STATUS_RANGE, "m5u256");
-    TEST_ASSERT_EQUAL_STRING("0..255", commands_refused_range());
+    TEST_ASSERT_EQUAL_STRING("0..255", range_text(range_refused()));
 }
 
 /* `$` stops first, as it must; nothing else changes. */
@@ -283,7 +284,7 @@ static void test_a_wrong_ramp_number_is_refused_with_the_range(void)
 {
     const session_t before = session;
     TEST_ASSERT_EQUAL(STATUS_RANGE, execute("$L2"));
-    TEST_ASSERT_EQUAL_STRING("0..1", commands_refused_range());
+    TEST_ASSERT_EQUAL_STRING("0..1", range_text(range_refused()));
     TEST_ASSERT_EQUAL(STATUS_RANGE, execute("$L10"));
     TEST_ASSERT_EQUAL(STATUS_SYNTAX, execute("$Lx"));
     TEST_ASSERT_EQUAL_MEMORY(&before, &session, sizeof before);

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "cli/commands.h"
+#include "cli/range.h"
 #include "cli/display.h"
 #include "eeprom/store.h"
 #include "host/fakes/eeprom_port_fake.h"
@@ -87,7 +88,7 @@ static void assert_refused(status_t expected, const char *range, const char *lin
     TEST_ASSERT_EQUAL_MESSAGE(expected, execute(line), line);
     TEST_ASSERT_EQUAL_UINT_MESSAGE(written, eeprom_fake.written, line);
     if (expected == STATUS_RANGE) {
-        TEST_ASSERT_EQUAL_STRING_MESSAGE(range, commands_refused_range(), line);
+        TEST_ASSERT_EQUAL_STRING_MESSAGE(range, range_text(range_refused()), line);
     }
 }
 

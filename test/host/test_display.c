@@ -1,5 +1,6 @@
 /* cli/display: what q, cf, vd, p and ? print. */
 #include "cli/display.h"
+#include "cli/text.h"
 #include <stdio.h>
 #include <string.h>
 #include "cli/commands.h"
@@ -254,6 +255,31 @@ static void test_cf_shows_what_held_when_it_was_asked_for(void)
     TEST_ASSERT_NOT_NULL(strstr(terminal_port_fake_text(), "a 1.00 d 1.00 harmonic\r\nGAP on"));
 }
 
+/* Texts are packed for the AVR alone (tools/pack_texts.py): here the pairs themselves. */
+static void test_a_pair_prints_the_two_that_it_stands_for(void)
+{
+    static const unsigned char pairs[][2] = {
+#define PAIR(first, second) {first, second},
+#include "cli/pairs.def"
+#undef PAIR
+    };
+    for (unsigned i = 0; i < sizeof pairs / sizeof pairs[0]; i++) {
+        char expected[TEXT_PIECE_BYTES] = "";
+        unsigned c = 0x80 + i;
+        for (; c >= 0x80; c = pairs[c - 0x80][1]) {
+            TEST_ASSERT_TRUE(pairs[c - 0x80][0] < 0x80 && strlen(expected) < TEXT_LONGEST - 1);
+            strcat(expected, (const char[]){(char)pairs[c - 0x80][0], '\0'});
+        }
+        strcat(expected, (const char[]){(char)c, '\0'});
+        terminal_port_fake_clear();
+        TEST_ASSERT_EQUAL_UINT8(strlen(expected), text_put((uint8_t)(0x80 + i)));
+        TEST_ASSERT_EQUAL_STRING(expected, terminal_port_fake_text());
+    }
+    terminal_port_fake_clear();
+    TEST_ASSERT_EQUAL_UINT8(3, text_put_flash("abc"));
+    TEST_ASSERT_EQUAL_STRING("abc", terminal_port_fake_text());
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -269,6 +295,7 @@ int main(void)
     RUN_TEST(test_p_shows_position_state_and_faults);
     RUN_TEST(test_the_list_has_one_line_for_each_available_command);
     RUN_TEST(test_a_display_waits_for_the_line_and_loses_nothing);
+    RUN_TEST(test_a_pair_prints_the_two_that_it_stands_for);
     RUN_TEST(test_displays_follow_each_other_in_the_order_asked_for);
     RUN_TEST(test_cf_shows_what_held_when_it_was_asked_for);
     return UNITY_END();

@@ -1,5 +1,6 @@
 /* cli/motion_syntax: motion commands and the single values v, vc, a, d. */
 #include "cli/motion_syntax.h"
+#include "cli/range.h"
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
@@ -48,7 +49,7 @@ static void assert_refused(status_t expected, const char *text)
 static void assert_refused_range(const char *range, const char *text)
 {
     assert_refused(STATUS_RANGE, text);
-    TEST_ASSERT_EQUAL_STRING(range, syntax.range);
+    TEST_ASSERT_EQUAL_STRING(range, range_text(range_refused()));
 }
 
 /* MOT-001, MOT-007 */

@@ -149,6 +149,55 @@ SETTING_KIND(RAMP, "0.01..999")
             self.assertEqual(code, self.manual()[0], words)
 
 
+class Texts(ToolTest):
+    """tools/pack_texts.py"""
+
+    ROW = '/* "busy" */\nSTATUS(BUSY, 1, "busy busy", "busy: wait")\n'
+
+    def pack(self, *arguments):
+        """Packs tables that say busy; returns the packed ones."""
+        self.write("firmware/cli/commands.def", 'COMMAND(Q, \'q\', HELP("q", "is it \\"busy\\"? busy\\t1"))\n')
+        self.write("firmware/cli/display.def", 'DISPLAY_TEXT(t, "busy\\n" STATE "\\0busy")\n')
+        self.write("firmware/base/status.def", self.ROW)
+        self.write("firmware/settings.def", 'SETTING(\'A\', "busy")\nSETTING_KIND(X, "busy")\n')
+        self.write("firmware/cli/pairs.def", "PAIR('s', 'y') /* 80 */\nPAIR('u', 0x80) /* 81 */\n")
+        code, said = self.tool("pack_texts.py", "out", *arguments)
+        self.assertEqual((0, ""), (code, said))
+        return {name: (self.folder / "out" / name).read_text(encoding="utf-8")
+                for name in ("cli/commands.def", "cli/display.def", "base/status.def", "settings.def")}
+
+    def test_pairs_are_replaced_in_the_texts_that_are_printed(self):
+        packed = self.pack()
+        self.assertIn('"is it \\042b\\201\\042? b\\201\\0111"', packed["cli/commands.def"])
+        self.assertIn('"b\\201\\012" STATE "\\000b\\201"', packed["cli/display.def"])
+        self.assertIn('SETTING(\'A\', "b\\201")', packed["settings.def"])
+
+    def test_ranges_advice_and_comments_stay(self):
+        packed = self.pack()
+        self.assertIn('SETTING_KIND(X, "busy")', packed["settings.def"])
+        self.assertEqual('/* "busy" */\nSTATUS(BUSY, 1, "b\\201 b\\201", "busy: wait")\n', packed["base/status.def"])
+
+    def test_pairs_are_chosen_from_the_texts(self):
+        packed = self.pack("--choose")
+        chosen = (self.folder / "firmware/cli/pairs.def").read_text(encoding="utf-8")
+        self.assertIn("PAIR('b', 'u') /* 80: \"bu\" */\nPAIR('s', 'y') /* 81: \"sy\" */\n", chosen)
+        self.assertIn("SETTING('A', \"\\200\\201\")", packed["settings.def"])
+
+    def test_the_firmwares_texts_come_back(self):
+        sys.path.insert(0, str(TOP / "tools"))
+        import pack_texts
+
+        code, said = self.tool("pack_texts.py", "--firmware", TOP / "firmware", "out")
+        self.assertEqual((0, ""), (code, said))
+        pairs = pack_texts.read_pairs((TOP / "firmware/cli/pairs.def").read_text(encoding="utf-8"))
+        self.assertLessEqual(len(pairs), pack_texts.PAIRS)
+        for name in pack_texts.TABLES:
+            plain = pack_texts.literals((TOP / "firmware" / name).read_text(encoding="utf-8"))
+            packed = pack_texts.literals((self.folder / "out" / name).read_text(encoding="utf-8"))
+            self.assertEqual(plain, [pack_texts.unpacked(string, pairs) for string in packed])
+            self.assertLess(sum(map(len, packed)), sum(map(len, plain)))
+
+
 class Image(ToolTest):
     """tools/check_size.py and tools/check_stack.py"""
 
