@@ -43,7 +43,8 @@ void boot_restore_factory(void)
     settings_to_factory();
 }
 
-int main(void)
+/* Where the start-up code ends (hal/start.S), and never left. */
+__attribute__((OS_main, section(".init9"))) int main(void)
 {
     pins_init();
     store_load_settings();
