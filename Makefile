@@ -34,6 +34,7 @@ UNITY ?= $(firstword $(wildcard .tools/unity /usr/share/cmock/vendor/unity/src) 
 # In the order in which they are linked: who calls whom stands near, and the call is half as long.
 FIRMWARE_SRCS := \
     firmware/hal/step_isr.S \
+    firmware/hal/step_snapshot.S \
     firmware/hal/encoder_isr.S \
     firmware/hal/start.S \
     firmware/hal/timebase_isr.S \

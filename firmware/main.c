@@ -55,7 +55,6 @@ __attribute__((OS_main, section(".init9"))) int main(void)
     encoder_init();
     atomic_enable();
 
-    bool started = false;
     for (;;) {
         /* Cleared before the polls: what an interrupt leaves to do meanwhile is seen in this round or the next. */
         wake_flag = 0;
@@ -65,9 +64,9 @@ __attribute__((OS_main, section(".init9"))) int main(void)
         }
         bool worked = false;
         if (boot_over()) {
-            if (!started) {
-                started = true;
-                if (boot_autorun_allowed() && saved && settings.autorun != 0) {
+            if (saved) {
+                saved = false; /* once */
+                if (boot_autorun_allowed() && settings.autorun != 0) {
                     (void)queue_loop_from_first(settings.autorun);
                 }
             }
