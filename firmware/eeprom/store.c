@@ -38,10 +38,11 @@ static struct store {
 } the_store;
 enum { JOB_ERASE = 1 << 0, JOB_SETTINGS = 1 << 1, JOB_QUEUE = 1 << 2 };
 
+/* To be asked for anew after a call, mostly: that is shorter than keeping it. */
 static inline struct store *self(void)
 {
-    struct store *store = &the_store;
-    NEAR(store);
+    struct store *store;
+    NEAR_TO(store, the_store);
     return store;
 }
 
@@ -95,8 +96,12 @@ uint8_t store_load_settings(void)
 
 uint8_t store_setting(uint8_t i)
 {
-    return the_store.sequence == NOT_VALID ? flash_u8((const uint8_t *)&settings_factory + i)
-                                           : eeprom_port_read((uint8_t)(the_store.newest + 1 + i));
+    struct store *const store = self();
+    const uint8_t address = (uint8_t)(store->newest + 1 + i);
+    if (store->sequence != NOT_VALID) {
+        return eeprom_port_read(address);
+    }
+    return flash_u8((const uint8_t *)&settings_factory + i);
 }
 
 /* The first of these jobs begins. */
@@ -175,8 +180,9 @@ static void end_job(void)
 /* Brings a cell to its value: true, and the job goes on, if it has it. */
 static bool put(uint16_t address, uint8_t value)
 {
+    const bool right = eeprom_port_read(address) == value;
     struct store *const store = self();
-    if (eeprom_port_read(address) == value) {
+    if (right) {
         store->at++;
         store->tries = 0;
         return true;

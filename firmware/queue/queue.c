@@ -35,10 +35,11 @@ static struct queue {
     uint8_t array[QUEUE_ARRAY + 1]; /* the last one stays 0 */
 } the_queue;
 
+/* To be asked for anew after a call: that is shorter than keeping it. Where there is one access, the_queue is. */
 static inline struct queue *self(void)
 {
-    struct queue *queue = &the_queue;
-    NEAR(queue);
+    struct queue *queue;
+    NEAR_TO(queue, the_queue);
     return queue;
 }
 
@@ -71,25 +72,33 @@ static NOINLINE bool ends_pass(void)
 /* ... and of all? As bounds and array are now; also where there is neither loop nor array. */
 static NOINLINE bool is_over(void)
 {
+    if (the_queue.run == RUN_NOTHING) {
+        return true;
+    }
+    if (!ends_pass()) {
+        return false;
+    }
     struct queue *const queue = self();
-    return queue->run == RUN_NOTHING ||
-           (ends_pass() && (queue->passes == 1 || (queue->run == RUN_ARRAY && queue->array[0] == 0)));
+    return queue->passes == 1 || (queue->run == RUN_ARRAY && queue->array[0] == 0);
 }
 
 /* The command that comes next; NONE if there is none. */
 static uint8_t choose(void)
 {
-    struct queue *const queue = self();
-    if (queue->preempting != NONE) {
-        return queue->preempting;
+    const uint8_t preempting = the_queue.preempting;
+    if (preempting != NONE) {
+        return preempting;
     }
     if (!is_over()) {
-        const uint8_t at = ends_pass() ? 0 : queue->at;
+        const bool anew = ends_pass();
+        struct queue *const queue = self();
+        const uint8_t at = anew ? 0 : queue->at;
         if (queue->run == RUN_ARRAY) {
             return queue->array[at];
         }
         return at == 0 ? queue->bounds[QUEUE_LOOP_START] : after(at);
     }
+    struct queue *const queue = self();
     if (queue->pending == 0) {
         return NONE;
     }
@@ -100,13 +109,16 @@ static uint8_t choose(void)
 /* What was chosen has begun. */
 static NOINLINE void advance(void)
 {
-    struct queue *const queue = self();
-    queue->executing = choose();
+    const uint8_t chosen = choose();
+    struct queue *queue = self();
+    queue->executing = chosen;
     queue->due = END_NOT;
     if (queue->preempting != NONE) {
         queue->preempting = NONE;
     } else if (!is_over()) {
-        if (ends_pass()) {
+        const bool ends = ends_pass();
+        queue = self();
+        if (ends) {
             if (queue->passes != 0) {
                 queue->passes--;
             }
@@ -117,10 +129,10 @@ static NOINLINE void advance(void)
             end_loop();
         }
     } else {
-        if (queue->run != RUN_NOTHING) {
+        if (the_queue.run != RUN_NOTHING) {
             end_loop();
         }
-        queue->pending--;
+        the_queue.pending--;
     }
 }
 
@@ -146,12 +158,11 @@ static NOINLINE bool offer(void)
 
 bool queue_poll(void)
 {
-    struct queue *const queue = self();
     const bool changed = note_begun();
-    if (queue->due != END_NOT && engine_next(queue->due == END_GRACEFULLY)) {
-        queue->due = END_NOT;
+    if (the_queue.due != END_NOT && engine_next(the_queue.due == END_GRACEFULLY)) {
+        the_queue.due = END_NOT;
     }
-    if (queue->run != RUN_NOTHING && is_over() && !queue_is_executing()) {
+    if (the_queue.run != RUN_NOTHING && is_over() && !queue_is_executing()) {
         end_loop();
     }
     return offer() | changed;
@@ -174,9 +185,9 @@ static NOINLINE void seed(uint8_t position, uint8_t last)
 
 void queue_init(void)
 {
-    struct queue *const queue = self();
     AT_BOOT_ZERO(the_queue);
     seed(QUEUE_CONTINUOUS, QUEUE_ONE_SHOT);
+    struct queue *const queue = self();
     queue->next_available = QUEUE_FIRST;
     queue->preempting = NONE;
     queue->begun = engine_commands_begun();
@@ -234,14 +245,14 @@ static void write(uint8_t position, const motion_command_t *command, bool added)
 
 status_t queue_add(const motion_command_t *command)
 {
-    struct queue *const queue = self();
     if (estop_port_active()) {
         return STATUS_ESTOP;
     }
-    if (queue->pending == QUEUE_LAST) {
+    if (the_queue.pending == QUEUE_LAST) {
         return STATUS_QUEUE_FULL;
     }
-    write(queue->next_available, command, true);
+    write(the_queue.next_available, command, true);
+    struct queue *const queue = self();
     queue->next_available = after(queue->next_available);
     queue->pending++;
     (void)offer();
@@ -255,12 +266,13 @@ void queue_edit(uint8_t position, const motion_command_t *command)
 
 status_t queue_undo(void)
 {
-    struct queue *const queue = self();
-    const uint8_t position = queue->undo_position;
+    const uint8_t position = the_queue.undo_position;
     if (position == 0 || position == queue_executing_position()) {
         return STATUS_NOTHING_TO_UNDO;
     }
-    *entry_at(position) = queue->undo;
+    motion_command_t *const entry = entry_at(position);
+    struct queue *const queue = self();
+    *entry = queue->undo;
     queue->undo_position = 0;
     if (queue->undo_added) {
         queue->next_available = position;
@@ -286,8 +298,8 @@ status_t queue_preempt_with(uint8_t position, const motion_command_t *command)
     if (estop_port_active()) {
         return STATUS_ESTOP;
     }
-    struct queue *const queue = self();
     *entry_at(position) = *command;
+    struct queue *const queue = self();
     queue->preempting = position;
     queue->due = END_NOW;
     (void)queue_poll();
@@ -477,9 +489,9 @@ void queue_stop_graceful(accel_code_t decel, bool linear)
  * continuous motion is, it shall end too; and a loop that it has interrupted executes one more command. */
 static void end_running(end_t how)
 {
-    struct queue *const queue = self();
     const bool ended = engine_next(how == END_GRACEFULLY);
     const bool continuous = is_continuous();
+    struct queue *const queue = self();
     if (!ended && continuous) {
         queue->due = how;
     }
