@@ -31,7 +31,7 @@ UNITY ?= $(firstword $(wildcard .tools/unity /usr/share/cmock/vendor/unity/src) 
 
 # -- the firmware's sources ------------------------------------------------------------------------------------------
 
-# In the order in which they are linked: who calls whom stands near, and the call is half as long.
+# (In which order their functions are linked is decided by firmware/link_order.ld.)
 FIRMWARE_SRCS := \
     firmware/hal/step_isr.S \
     firmware/hal/step_snapshot.S \
@@ -153,8 +153,8 @@ AVR_WARNINGS := -Wall -Wextra -Wconversion -Wshadow -Wlogical-op -Wstrict-protot
 # (Not := : `make setup firmware` installs the compiler first.)
 AVR_VERSION = $(shell $(AVR)gcc -dumpversion 2>/dev/null)
 AVR_SMALLER = -Os -mcall-prologues -mstrict-X -fno-gcse -fno-move-loop-invariants -fno-ipa-sra \
-    -flto -fno-tree-forwprop -fno-tree-dominator-opts -fno-inline-small-functions -fira-algorithm=priority \
-    -fno-tree-sink -fno-ssa-phiopt -fweb -frename-registers -fno-tree-copy-prop -fno-tree-coalesce-vars \
+    -flto -fno-tree-forwprop -fno-tree-dominator-opts -fno-inline-small-functions -fira-algorithm=priority -fira-region=all \
+    -fno-tree-sink -fweb -frename-registers -fno-tree-copy-prop -fno-tree-coalesce-vars \
     -fno-tree-scev-cprop -fno-tree-copyrename -flto-partition=none $(if $(filter 5.%,$(AVR_VERSION)),-fno-toplevel-reorder)
 AVR_CFLAGS = $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 $(AVR_SMALLER) -g -ffunction-sections -fdata-sections -fshort-enums \
     -fstack-usage -Ifirmware $(AVR_WARNINGS)

@@ -121,8 +121,8 @@ def main():
     parser.add_argument("--map", required=True)
     parser.add_argument("--objdump", default="avr-objdump")
     parser.add_argument("--pinned", nargs="*", default=[], help="sections that image.ld places itself")
-    parser.add_argument("--rounds", type=int, default=300000)
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--rounds", type=int, default=600000)
+    parser.add_argument("--seed", type=int, default=2)
     parser.add_argument("--write", type=pathlib.Path, default=pathlib.Path("firmware/link_order.ld"))
     arguments = parser.parse_args()
 

@@ -159,7 +159,7 @@ uint8_t store_busy(void)
 }
 
 /* Byte i of the record that the present job writes. */
-static uint8_t wanted_byte(uint16_t i)
+static NOINLINE uint8_t wanted_byte(uint16_t i)
 {
     struct store *const store = self();
     if (!(store->jobs & JOB_SETTINGS)) {

@@ -435,8 +435,7 @@ uint8_t queue_array(uint8_t entry)
 
 NOINLINE status_t queue_array_run(uint16_t count)
 {
-    struct queue *const queue = self();
-    const uint8_t *array = queue->array;
+    const uint8_t *array = the_queue.array;
     if (*array == 0) {
         return STATUS_ARRAY_EMPTY;
     }
@@ -447,7 +446,7 @@ NOINLINE status_t queue_array_run(uint16_t count)
         }
     } while (*++array != 0);
     end_loop();
-    queue->passes = count;
+    self()->passes = count;
     begin_run(RUN_ARRAY);
     return STATUS_OK;
 }
