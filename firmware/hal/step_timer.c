@@ -171,8 +171,9 @@ void step_port_halt(void)
             s = before; /* its last period is running */
         bool fast = s->top < SEGMENT_EARLY1_BELOW_TICKS;
         uint16_t match = s->match;
+        volatile timer1_t *const timer = timer1();
         cli();
-        if (TCCR1B == MODE15_B) {
+        if (timer->control_b == MODE15_B) {
             TIMSK1 = 0; /* it is held */
             EIMSK &= (uint8_t)~(1 << INT1);
             sei();
@@ -184,18 +185,13 @@ void step_port_halt(void)
                 while (!(TIFR1 & 1 << TOV1))
                     if (EIFR & 1 << INTF0)
                         goto let_pass; /* it knows better */
-                TCCR1B = MODE15_B;
-                TIMSK1 = 0;
-                sei();
-                return;
+            } else if ((uint16_t)(timer->counter + FREEZE_TICKS) >= match) { /* (SEGMENT_SILENT is the highest) */
+                goto let_pass;
             }
-            uint16_t now = TCNT1;
-            if ((uint16_t)(now + FREEZE_TICKS) < match) { /* (SEGMENT_SILENT is the highest) */
-                TCCR1B = MODE15_B; /* no clock: nothing moves from here on */
-                TIMSK1 = 0;
-                sei();
-                return;
-            }
+            timer->control_b = MODE15_B; /* no clock: nothing moves from here on */
+            TIMSK1 = 0;
+            sei();
+            return;
         }
     let_pass: /* a pulse is due or there, or Estop */
         sei();
