@@ -31,11 +31,12 @@ UNITY ?= $(firstword $(wildcard .tools/unity /usr/share/cmock/vendor/unity/src) 
 
 # -- the firmware's sources ------------------------------------------------------------------------------------------
 
-# In the order in which they are linked: who calls whom stands near, and the call is half as long.
+# (In which order their functions are linked is decided by firmware/link_order.ld.)
 FIRMWARE_SRCS := \
     firmware/hal/step_isr.S \
+    firmware/hal/step_snapshot.S \
     firmware/hal/encoder_isr.S \
-    firmware/hal/reset_init.S \
+    firmware/hal/start.S \
     firmware/hal/timebase_isr.S \
     firmware/hal/usart_isr.S \
     firmware/motion/ramp.c \
@@ -154,13 +155,13 @@ AVR_WARNINGS := -Wall -Wextra -Wconversion -Wshadow -Wlogical-op -Wstrict-protot
 # (Not := : `make setup firmware` installs the compiler first.)
 AVR_VERSION = $(shell $(AVR)gcc -dumpversion 2>/dev/null)
 AVR_SMALLER = -Os -mcall-prologues -mstrict-X -fno-gcse -fno-move-loop-invariants -fno-ipa-sra \
-    -flto -fno-tree-forwprop -fno-tree-dominator-opts -fno-inline-small-functions -fira-algorithm=priority \
-    -fno-tree-sink -fno-ssa-phiopt -fweb -frename-registers -fno-tree-copy-prop -fno-tree-coalesce-vars \
+    -flto -fno-tree-forwprop -fno-tree-dominator-opts -fno-inline-small-functions -fira-algorithm=priority -fira-region=all \
+    -fno-tree-sink -fweb -frename-registers -fno-tree-copy-prop -fno-tree-coalesce-vars \
     -fno-tree-scev-cprop -fno-tree-copyrename -flto-partition=none $(if $(filter 5.%,$(AVR_VERSION)),-fno-toplevel-reorder)
 AVR_CFLAGS = $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 $(AVR_SMALLER) -g -ffunction-sections -fdata-sections -fshort-enums \
     -fstack-usage -I$(BUILD)/packed -Ifirmware $(AVR_WARNINGS)
-# The segment ring stands alone in the first 256 bytes of RAM, so that the step interrupt addresses it with one byte.
-AVR_LDFLAGS := $(AVR_MCU) -Wl,--gc-sections -mrelax -Wl,--section-start=.segments=0x800100 -Wl,-Tdata=0x800200
+AVR_LDFLAGS := $(AVR_MCU) -Wl,--gc-sections -mrelax -nostartfiles -T firmware/image.ld -Lfirmware
+LINK_SCRIPTS := firmware/image.ld firmware/link_order.ld
 
 FIRMWARE_OBJS := $(FIRMWARE_SRCS:firmware/%=$(BUILD)/firmware/%.o)
 
@@ -186,13 +187,18 @@ $(BUILD)/firmware/%.o: firmware/% $(BUILD)/firmware/flags $(PACKED)
 	$(call say,CC  $@)
 	$(Q)$(AVR)gcc $(AVR_CFLAGS) $(DEFS) -MMD -MP -c -o $@ $<
 
-$(BUILD)/sac.elf: $(FIRMWARE_OBJS) $(BUILD)/firmware/flags
+$(BUILD)/sac.elf: $(FIRMWARE_OBJS) $(LINK_SCRIPTS) $(BUILD)/firmware/flags
 	$(call say,LD  $@)
 	$(Q)$(AVR)gcc $(AVR_CFLAGS) $(AVR_LDFLAGS) -Wl,-Map=$(BUILD)/sac.map -o $@ $(FIRMWARE_OBJS)
 
 $(BUILD)/sac.hex: $(BUILD)/sac.elf
 	$(call say,HEX $@)
 	$(Q)$(AVR)objcopy -O ihex -j .text -j .data $< $@
+
+.PHONY: link-order
+link-order: $(BUILD)/sac.elf ## find the order of the functions with the most short calls: after larger changes
+	@$(PYTHON) tools/link_order.py $< --map $(BUILD)/sac.map --objdump $(AVR)objdump --pinned .text.step_isr
+	@$(MAKE) -s --no-print-directory firmware
 
 .PHONY: budgets
 budgets: $(BUILD)/sac.elf

@@ -43,7 +43,8 @@ void boot_restore_factory(void)
     settings_to_factory();
 }
 
-int main(void)
+/* Where the start-up code ends (hal/start.S), and never left. */
+__attribute__((OS_main, section(".init9"))) int main(void)
 {
     pins_init();
     store_load_settings();
@@ -54,7 +55,6 @@ int main(void)
     encoder_init();
     atomic_enable();
 
-    bool started = false;
     for (;;) {
         /* Cleared before the polls: what an interrupt leaves to do meanwhile is seen in this round or the next. */
         wake_flag = 0;
@@ -64,9 +64,9 @@ int main(void)
         }
         bool worked = false;
         if (boot_over()) {
-            if (!started) {
-                started = true;
-                if (boot_autorun_allowed() && saved && settings.autorun != 0) {
+            if (saved) {
+                saved = false; /* once */
+                if (boot_autorun_allowed() && settings.autorun != 0) {
                     (void)queue_loop_from_first(settings.autorun);
                 }
             }

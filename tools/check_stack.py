@@ -193,7 +193,7 @@ class Walker:
                     y_depth += change - 65536 if change >= 32768 else change
                     pending = None
                 elif mnemonic == "out" and operands[0] == SP_LOW:
-                    if self.image.name(address) in ("__init", "__ctors_end", "__vectors", "__trampolines_end"):
+                    if self.image.name(address) in ("__init", "__ctors_end", "__vectors", "__trampolines_end", "start"):
                         depth = 0  # start-up: the stack pointer is set to the end of RAM
                     elif operands[1] == "r28" and y_depth is not None:
                         depth = y_depth
@@ -274,9 +274,9 @@ def main():
         main_bytes, main_path = walker.bound(0)
         let_in, closed = [], [(0, ["none"])]
         for vector in range(1, VECTORS):
-            entry = image.code[vector * VECTOR_BYTES][2]
-            if image.name(entry) == "__bad_interrupt":
-                continue
+            entry = image.code.get(vector * VECTOR_BYTES, (None, None, None))[2]
+            if entry is None or not image.name(entry).startswith("__vector_"):
+                continue  # not used
             below, path = walker.bound(entry)
             (let_in if entry in walker.lets_interrupts_in else closed).append((below, path))
     except Unbounded as problem:

@@ -15,4 +15,12 @@
 #define NEAR(pointer) ((void)(pointer))
 #endif
 
+/* The same for a new pointer to that variable; nothing is kept of it across calls, where loading it again is shorter. */
+#ifdef __AVR__
+#define NEAR_TO(pointer, variable) \
+    __asm__ volatile("ldi %A0, lo8(%1)\n\tldi %B0, hi8(%1)" : "=z"(pointer) : "i"(&(variable)))
+#else
+#define NEAR_TO(pointer, variable) ((void)((pointer) = &(variable)))
+#endif
+
 #endif

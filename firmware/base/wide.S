@@ -55,9 +55,8 @@ wide_multiply:                  /* r24 product, r22 x, r20 y */
         push    r29
         push    r16
         movw    r30, r24
-        clr     r18
         ldi     r19, 8
-1:      st      Z+, r18
+1:      st      Z+, r1
         dec     r19
         brne    1b
         ldi     r19, 8          /* bytes of y that still count */
@@ -144,7 +143,7 @@ wide_divide:                    /* r24 x, r20-r23 divisor; returns the remainder
         brne    1b
         ret
 
-/* Two bits of x make one of the root. In r23-r27 twice the root so far, in r18-r22 what it leaves of x. */
+/* Two bits of x make one of the root. In r22-r26 twice the root so far, in r17-r21 what it leaves of x. */
         .section .text.wide_root, "ax", @progbits
         .global wide_root
         .type wide_root, @function
@@ -153,60 +152,57 @@ wide_root:                      /* r24 x; returns r22-r25 */
         push    r17
         movw    r30, r24
         adiw    r30, 8
+        clr     r17
         clr     r18
         clr     r19
         movw    r20, r18
         movw    r22, r18
         movw    r24, r18
-        movw    r26, r18
-        ldi     r17, 8          /* bytes */
+        clr     r26
+        ldi     r27, 8          /* bytes */
 1:      ld      r0, -Z
         ldi     r16, 4          /* pairs of bits */
 2:      lsl     r0
+        rol     r17
         rol     r18
         rol     r19
         rol     r20
         rol     r21
-        rol     r22
         lsl     r0
+        rol     r17
         rol     r18
         rol     r19
         rol     r20
         rol     r21
-        rol     r22
-        lsl     r23
+        lsl     r22
+        rol     r23
         rol     r24
         rol     r25
         rol     r26
-        rol     r27
-        inc     r23             /* twice the root, and one: what a bit more takes */
-        cp      r18, r23
+        inc     r22             /* twice the root, and one: what a bit more takes */
+        cp      r17, r22
+        cpc     r18, r23
         cpc     r19, r24
         cpc     r20, r25
         cpc     r21, r26
-        cpc     r22, r27
         brlo    3f
-        sub     r18, r23
+        sub     r17, r22
+        sbc     r18, r23
         sbc     r19, r24
         sbc     r20, r25
         sbc     r21, r26
-        sbc     r22, r27
-        inc     r23
-        inc     r23
-3:      dec     r23
+        inc     r22
+        inc     r22
+3:      dec     r22
         dec     r16
         brne    2b
-        dec     r17
+        dec     r27
         brne    1b
-        lsr     r27
-        ror     r26
+        lsr     r26
         ror     r25
         ror     r24
         ror     r23
-        mov     r22, r23
-        mov     r23, r24
-        mov     r24, r25
-        mov     r25, r26
+        ror     r22
         pop     r17
         pop     r16
         ret

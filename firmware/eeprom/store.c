@@ -38,10 +38,11 @@ static struct store {
 } the_store;
 enum { JOB_ERASE = 1 << 0, JOB_SETTINGS = 1 << 1, JOB_QUEUE = 1 << 2 };
 
+/* To be asked for anew after a call, mostly: that is shorter than keeping it. */
 static inline struct store *self(void)
 {
-    struct store *store = &the_store;
-    NEAR(store);
+    struct store *store;
+    NEAR_TO(store, the_store);
     return store;
 }
 
@@ -53,12 +54,13 @@ static NOINLINE uint16_t first_sum(uint8_t mark)
 /* The mark of the record at that address, or NOT_VALID. */
 static NOINLINE uint8_t valid_mark(uint8_t first, uint16_t bytes)
 {
-    const uint8_t mark = eeprom_port_read(first);
-    uint16_t crc = first_sum(mark);
     uint16_t address = first;
-    for (uint16_t left = bytes + CHECKSUM_BYTES; left > 0; left--) {
+    const uint16_t end = (uint16_t)(first + bytes + CHECKSUM_BYTES);
+    const uint8_t mark = eeprom_port_read(address);
+    uint16_t crc = first_sum(mark);
+    do {
         crc = crc16_add(crc, eeprom_port_read(++address));
-    }
+    } while (address != end);
     return crc == 0 && mark < 0x80 ? mark : NOT_VALID;
 }
 
@@ -84,22 +86,29 @@ uint8_t store_load_settings(void)
         store->sequence = other;
         store->newest = 0;
     }
-    for (uint8_t i = 0; i < SETTINGS_BYTES; i++) {
+    uint8_t i = SETTINGS_BYTES;
+    do {
+        i--;
         ((uint8_t *)&settings)[i] = store_setting(i);
-    }
+    } while (i != 0);
     return store->sequence;
 }
 
 uint8_t store_setting(uint8_t i)
 {
-    return the_store.sequence == NOT_VALID ? flash_u8((const uint8_t *)&settings_factory + i)
-                                           : eeprom_port_read((uint8_t)(the_store.newest + 1 + i));
+    struct store *const store = self();
+    const uint8_t address = (uint8_t)(store->newest + 1 + i);
+    if (store->sequence != NOT_VALID) {
+        return eeprom_port_read(address);
+    }
+    return flash_u8((const uint8_t *)&settings_factory + i);
 }
 
-static void begin(uint8_t job)
+/* The first of these jobs begins. */
+static NOINLINE void begin(uint8_t jobs)
 {
     struct store *const store = self();
-    store->jobs |= job;
+    store->jobs = jobs;
     store->at = 0;
     store->tries = 0;
 }
@@ -113,20 +122,19 @@ status_t store_change(uint8_t offset, uint8_t more, uint32_t value)
     store->change_offset = offset;
     store->change_more = more;
     store->change_value = value;
-    begin(JOB_SETTINGS); /* a save of the queue begins anew afterwards: what it has written is not written twice */
+    begin(store->jobs | JOB_SETTINGS); /* a save of the queue begins anew afterwards: what it has written is not written twice */
     return STATUS_OK;
 }
 
 void store_restore_factory(void)
 {
-    the_store.jobs = 0;
     begin(JOB_ERASE);
 }
 
 void store_save_queue(const void *entries)
 {
     the_store.queue = entries;
-    begin(JOB_QUEUE);
+    begin(the_store.jobs | JOB_QUEUE);
 }
 
 store_queue_t store_load_queue(void *entries)
@@ -151,7 +159,7 @@ uint8_t store_busy(void)
 }
 
 /* Byte i of the record that the present job writes. */
-static uint8_t wanted_byte(uint16_t i)
+static NOINLINE uint8_t wanted_byte(uint16_t i)
 {
     struct store *const store = self();
     if (!(store->jobs & JOB_SETTINGS)) {
@@ -165,17 +173,16 @@ static uint8_t wanted_byte(uint16_t i)
 /* The present job is over. */
 static void end_job(void)
 {
-    struct store *const store = self();
-    store->jobs = (uint8_t)(store->jobs & (store->jobs - 1)); /* the lowest bit */
-    store->at = 0;
-    store->tries = 0;
+    const uint8_t jobs = the_store.jobs;
+    begin((uint8_t)(jobs & (jobs - 1))); /* without the lowest bit */
 }
 
 /* Brings a cell to its value: true, and the job goes on, if it has it. */
 static bool put(uint16_t address, uint8_t value)
 {
+    const bool right = eeprom_port_read(address) == value;
     struct store *const store = self();
-    if (eeprom_port_read(address) == value) {
+    if (right) {
         store->at++;
         store->tries = 0;
         return true;

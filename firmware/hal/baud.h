@@ -19,8 +19,12 @@ typedef struct {
  * one needs 8 samples. baud: >= 1. */
 static inline baud_divisor_t baud_divisor(uint32_t baud)
 {
-    uint32_t quotient = ((uint32_t)BOARD_CPU_HZ / 8 + baud / 2) / baud;
-    uint16_t eighths = quotient > 8192 ? 8192 : quotient == 0 ? 1 : (uint16_t)quotient;
+    const uint32_t quotient = (uint32_t)BOARD_CPU_HZ / 4 / baud;
+    const uint16_t sixteenths = quotient > 16384 ? 16384 : (uint16_t)quotient;
+    uint16_t eighths = (uint16_t)(sixteenths + 1) / 2;
+    if (eighths == 0) {
+        eighths = 1;
+    }
     const bool u2x = (eighths & 1) != 0 && eighths <= 4096;
     if (!u2x) {
         eighths /= 2;

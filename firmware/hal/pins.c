@@ -42,8 +42,10 @@ void pins_init(void)
 /* A one written to PINx toggles its bit of PORTx (datasheet 14.2.2): no other pin is touched, whatever interrupts do. */
 void pins_microsteps(uint8_t pins)
 {
-    PINC = (uint8_t)((PORTC ^ pins << 3) & (1 << 3 | 1 << 4));
-    PINB = (uint8_t)((PORTB ^ pins << 2) & 1 << 4);
+    const uint8_t ms3 = (uint8_t)(pins << 2);
+    const uint8_t ms1_ms2 = (uint8_t)(ms3 << 1);
+    PINC = (PORTC ^ ms1_ms2) & (1 << 3 | 1 << 4);
+    PINB = (PORTB ^ ms3) & 1 << 4;
 }
 
 void ops_port_set(bool executing)

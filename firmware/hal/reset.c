@@ -1,9 +1,9 @@
-/* The reset's cause, the watchdog, and the RST post. reset_init.S has begun with it. */
+/* The reset's cause, the watchdog, and the RST post. start.S has begun with it. */
 #include <avr/io.h>
 #include <avr/wdt.h>
 #include "boot_port.h"
 
-/* Above .bss, which the start-up code clears after reset_init.S has written this. */
+/* Above .bss, which the start-up code clears after start.S has written this. */
 uint8_t boot_port_flags __attribute__((section(".noinit")));
 
 bool boot_port_rst_low(void)

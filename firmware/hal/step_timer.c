@@ -9,6 +9,7 @@
 #include "motion/step_port.h"
 #include <avr/interrupt.h>
 #include <avr/io.h>
+#include <stddef.h>
 
 #define MODE15_A (1 << COM1B1 | 1 << COM1B0 | 1 << WGM11 | 1 << WGM10)
 #define MODE15_B (1 << WGM13 | 1 << WGM12)
@@ -23,6 +24,20 @@
 /* Where periods are short there is no time to look at all this with interrupts off. */
 #define ARM_LEAST_TICKS 256
 
+/* Timer1's registers as they lie in the memory (datasheet, register summary): written one after the other they are
+ * reached by a displacement, in instructions half as long. */
+typedef struct {
+    uint8_t control_a, control_b, control_c, reserved;
+    uint16_t counter, capture, top, match;
+} timer1_t;
+
+static inline volatile timer1_t *timer1(void)
+{
+    volatile timer1_t *timer = (volatile timer1_t *)&TCCR1A;
+    NEAR(timer);
+    return timer;
+}
+
 /* Periods less one, from the bytes that are counted down: the low one 1..256 times, and so often 256 more. */
 static inline uint16_t less_one(uint8_t low, uint8_t high)
 {
@@ -33,12 +48,6 @@ static inline void set_less_one(segment_t *segment, uint16_t periods_less_one)
 {
     segment->count_low = (uint8_t)(periods_less_one + 1);
     segment->count_high = (uint8_t)(periods_less_one >> 8);
-}
-
-static void set_compare(uint16_t top, uint16_t match)
-{
-    OCR1A = top;
-    OCR1B = match;
 }
 
 /* Mode 0, no clock: the compare registers are written directly (section 16.7.3). */
@@ -61,11 +70,13 @@ void step_port_dir(bool level)
 /* The timer stands ready: all but its clock. */
 static void make_ready(void)
 {
+    volatile timer1_t *const timer = timer1();
     step_port_init();
-    set_compare(STEP_PORT_LEAD_TICKS + LEAD_BEGIN - 1, SEGMENT_SILENT);
-    TCNT1 = LEAD_BEGIN;
-    TCCR1A = MODE15_A;
-    TCCR1B = MODE15_B;
+    timer->top = STEP_PORT_LEAD_TICKS + LEAD_BEGIN - 1;
+    timer->match = SEGMENT_SILENT;
+    timer->counter = LEAD_BEGIN;
+    timer->control_a = MODE15_A;
+    timer->control_b = MODE15_B;
 
     uint8_t first = step_tail;
     segment_t *lead = segment_at((uint8_t)(first - SEGMENT_BYTES));
@@ -73,7 +84,8 @@ static void make_ready(void)
     lead->match = SEGMENT_SILENT;
     lead->flags = 0;
     const segment_t *s = segment_at(first);
-    set_compare(s->top, s->match);
+    timer->top = s->top;
+    timer->match = s->match;
     GPIOR0 = s->count_low;
     GPIOR1 = s->count_high;
     step_flags = s->flags;
@@ -132,21 +144,10 @@ bool estop_port_poll(void)
     return active;
 }
 
-step_snapshot_t step_port_snapshot(void)
-{
-    step_snapshot_t at;
-    uint8_t state = atomic_begin();
-    uint8_t low = GPIOR0;
-    uint8_t high = GPIOR1;
-    uint8_t flags = TIFR1;
-    uint8_t pins = PINB;
-    at.tail = step_tail;
-    atomic_end(state);
-    at.to_count = (uint16_t)(less_one(low, high) + 1);
-    at.pulse_high = (pins & 1 << 2) != 0;
-    at.period_over = (flags & 1 << TOV1) != 0;
-    return at;
-}
+/* Where step_snapshot.S puts them. */
+_Static_assert(offsetof(step_snapshot_t, tail) == 0 && offsetof(step_snapshot_t, to_count) == 1 &&
+                   offsetof(step_snapshot_t, pulse_high) == 3 && offsetof(step_snapshot_t, period_over) == 4 && TOV1 == 0,
+               "in r18 to r22");
 
 uint16_t step_port_counter(void)
 {
@@ -170,8 +171,9 @@ void step_port_halt(void)
             s = before; /* its last period is running */
         bool fast = s->top < SEGMENT_EARLY1_BELOW_TICKS;
         uint16_t match = s->match;
+        volatile timer1_t *const timer = timer1();
         cli();
-        if (TCCR1B == MODE15_B) {
+        if (timer->control_b == MODE15_B) {
             TIMSK1 = 0; /* it is held */
             EIMSK &= (uint8_t)~(1 << INT1);
             sei();
@@ -183,18 +185,13 @@ void step_port_halt(void)
                 while (!(TIFR1 & 1 << TOV1))
                     if (EIFR & 1 << INTF0)
                         goto let_pass; /* it knows better */
-                TCCR1B = MODE15_B;
-                TIMSK1 = 0;
-                sei();
-                return;
+            } else if ((uint16_t)(timer->counter + FREEZE_TICKS) >= match) { /* (SEGMENT_SILENT is the highest) */
+                goto let_pass;
             }
-            uint16_t now = TCNT1;
-            if (match == SEGMENT_SILENT || (uint16_t)(now + FREEZE_TICKS) < match) {
-                TCCR1B = MODE15_B; /* no clock: nothing moves from here on */
-                TIMSK1 = 0;
-                sei();
-                return;
-            }
+            timer->control_b = MODE15_B; /* no clock: nothing moves from here on */
+            TIMSK1 = 0;
+            sei();
+            return;
         }
     let_pass: /* a pulse is due or there, or Estop */
         sei();
@@ -227,7 +224,8 @@ bool step_port_arm(uint8_t offset, uint16_t top, uint16_t match, uint8_t flags)
         done = (uint8_t)(after - tail) <= (uint8_t)(head - tail);
     } else if (rise >= ARM_LEAST_TICKS && TIMSK1 && !(TIFR1 & 1 << TOV1) && (uint16_t)(TCNT1 + ARM_TICKS) < rise) {
         /* Loaded, but the period before it is still running: into the buffers. */
-        set_compare(top, match);
+        OCR1A = top;
+        OCR1B = match;
         step_flags = flags;
         done = true;
     }

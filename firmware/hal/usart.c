@@ -1,6 +1,7 @@
 /* USART0 as the terminal's port: rings between the main loop and the interrupts of usart_isr.S.
  * Source: ATmega328P datasheet DS40002061, section 20. */
 #include <avr/io.h>
+#include "base/inline.h"
 #include "cli/terminal_port.h"
 #include "hal/baud.h"
 #include "hal/usart.h"
@@ -12,17 +13,25 @@ volatile uint8_t usart_rx_bytes[USART_RX_BYTES];
 volatile uint8_t usart_tx_bytes[USART_TX_BYTES];
 volatile uint8_t usart_rx_head, usart_rx_tail, usart_tx_head, usart_tx_tail;
 
+/* The port's registers as they lie in the memory (datasheet, register summary). */
+typedef struct {
+    uint8_t status_a, control_b, control_c, reserved;
+    uint16_t divisor;
+} usart_t;
+
 void terminal_port_init(uint32_t baud)
 {
     const baud_divisor_t divisor = baud_divisor(baud);
-    const uint8_t u2x = divisor.u2x ? _BV(U2X0) : 0;
-    if (UBRR0 == divisor.ubrr && (UCSR0A & _BV(U2X0)) == u2x && UCSR0B != 0) {
+    const uint8_t u2x = (uint8_t)(divisor.u2x << U2X0);
+    volatile usart_t *usart = (volatile usart_t *)&UCSR0A;
+    NEAR(usart);
+    if (usart->divisor == divisor.ubrr && ((usart->status_a ^ u2x) & _BV(U2X0)) == 0 && usart->control_b != 0) {
         return; /* as it is: a write would spoil what is being received */
     }
-    UCSR0A = u2x;
-    UBRR0 = divisor.ubrr;
-    UCSR0C = _BV(UCSZ01) | _BV(UCSZ00); /* 8 data bits, no parity, 1 stop bit */
-    UCSR0B = USART_CONTROL | _BV(RXCIE0);
+    usart->status_a = u2x;
+    usart->divisor = divisor.ubrr;
+    usart->control_c = _BV(UCSZ01) | _BV(UCSZ00); /* 8 data bits, no parity, 1 stop bit */
+    usart->control_b = USART_CONTROL | _BV(RXCIE0);
 }
 
 int16_t terminal_port_get(void)

@@ -27,10 +27,11 @@ bool encoder_poll(void)
         if (moving) {
             queue_throttle(lines);
         } else {
-            const int8_t one = lines < 0 ? -1 : 1;
-            for (; lines != 0; lines = (int8_t)(lines - one)) {
-                engine_single_pulse(one < 0);
-            }
+            do {
+                const bool ccw = lines < 0;
+                engine_single_pulse(ccw);
+                lines = (int8_t)(ccw ? lines + 1 : lines - 1);
+            } while (lines != 0);
         }
     }
     return true;

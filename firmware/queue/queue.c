@@ -13,32 +13,34 @@ typedef enum { RUN_NOTHING, RUN_LOOP, RUN_ARRAY } run_t;
 typedef enum { END_NOT, END_NOW, END_GRACEFULLY } end_t;
 
 static motion_command_t entries[QUEUE_POSITIONS];
-static uint8_t array[QUEUE_ARRAY + 1]; /* the last one stays 0 */
-static uint8_t next_available; /* 1..30 */
-static uint8_t pending;        /* 0..30: the entries before it */
-static uint8_t preempting;     /* position that comes before all others, or NONE */
-static end_t due;              /* how what runs still has to be ended, as soon as it can be */
-static uint8_t executing;      /* position of the command begun last */
-static uint8_t begun;          /* engine_commands_begun() that `executing` belongs to */
 
-static run_t run;
-static uint8_t at;         /* of the loop the position begun last, of the array the entry after it; 0: none yet */
-static uint8_t bounds[2];  /* of the loop, by queue_bound_t; 0: not known */
-static uint16_t passes;    /* still to be made; 0: endless */
-static bool last_of_loop;  /* one more command, then it ends */
+static struct queue {
+    uint8_t next_available; /* 1..30 */
+    uint8_t pending;        /* 0..30: the entries before it */
+    uint8_t preempting;     /* position that comes before all others, or NONE */
+    end_t due;              /* how what runs still has to be ended, as soon as it can be */
+    uint8_t executing;      /* position of the command begun last */
+    uint8_t begun;          /* engine_commands_begun() that `executing` belongs to */
 
-static motion_command_t undo; /* what was at ... */
-static uint8_t undo_position; /* ... before the last change; 0: nothing to be taken back */
-static bool undo_added;       /* it was a new entry */
+    run_t run;
+    uint8_t at;        /* of the loop the position begun last, of the array the entry after it; 0: none yet */
+    uint8_t bounds[2]; /* of the loop, by queue_bound_t; 0: not known */
+    uint16_t passes;   /* still to be made; 0: endless */
+    bool last_of_loop; /* one more command, then it ends */
 
-static void revolution(motion_command_t *seed)
+    bool undo_added;       /* the last change made a new entry */
+    uint8_t undo_position; /* of that change; 0: nothing to be taken back */
+    motion_command_t undo; /* what was there before */
+
+    uint8_t array[QUEUE_ARRAY + 1]; /* the last one stays 0 */
+} the_queue;
+
+/* To be asked for anew after a call: that is shorter than keeping it. Where there is one access, the_queue is. */
+static inline struct queue *self(void)
 {
-    session_template(&session, seed);
-    seed->count = settings.steps_per_rev;
-    seed->flags &= (uint8_t)~MOTION_PULSES;
-    if (settings.direction != 0) {
-        seed->flags |= MOTION_CCW;
-    }
+    struct queue *queue;
+    NEAR_TO(queue, the_queue);
+    return queue;
 }
 
 static uint8_t after(uint8_t position)
@@ -46,78 +48,102 @@ static uint8_t after(uint8_t position)
     return position == QUEUE_LAST ? QUEUE_FIRST : (uint8_t)(position + 1);
 }
 
-static void end_loop(void)
+static NOINLINE motion_command_t *entry_at(uint8_t position)
 {
-    run = RUN_NOTHING;
-    last_of_loop = false;
-    bounds[QUEUE_LOOP_START] = bounds[QUEUE_LOOP_FINISH] = 0;
-    passes = 0;
+    return &entries[position];
+}
+
+static NOINLINE void end_loop(void)
+{
+    struct queue *const queue = self();
+    queue->run = RUN_NOTHING;
+    queue->last_of_loop = false;
+    queue->bounds[QUEUE_LOOP_START] = queue->bounds[QUEUE_LOOP_FINISH] = 0;
+    queue->passes = 0;
 }
 
 /* Is what has begun of the loop or the array the last one of a pass ... */
 static NOINLINE bool ends_pass(void)
 {
-    return run == RUN_LOOP ? at == bounds[QUEUE_LOOP_FINISH] : array[at] == 0;
+    struct queue *const queue = self();
+    return queue->run == RUN_LOOP ? queue->at == queue->bounds[QUEUE_LOOP_FINISH] : queue->array[queue->at] == 0;
 }
 
-/* ... and of all? As bounds and array are now. */
+/* ... and of all? As bounds and array are now; also where there is neither loop nor array. */
 static NOINLINE bool is_over(void)
 {
-    return ends_pass() && (passes == 1 || (run == RUN_ARRAY && array[0] == 0));
+    if (the_queue.run == RUN_NOTHING) {
+        return true;
+    }
+    if (!ends_pass()) {
+        return false;
+    }
+    struct queue *const queue = self();
+    return queue->passes == 1 || (queue->run == RUN_ARRAY && queue->array[0] == 0);
 }
 
 /* The command that comes next; NONE if there is none. */
 static uint8_t choose(void)
 {
+    const uint8_t preempting = the_queue.preempting;
     if (preempting != NONE) {
         return preempting;
     }
-    if (run != RUN_NOTHING && !is_over()) {
-        if (run == RUN_ARRAY) {
-            return array[ends_pass() ? 0 : at];
+    if (!is_over()) {
+        const bool anew = ends_pass();
+        struct queue *const queue = self();
+        const uint8_t at = anew ? 0 : queue->at;
+        if (queue->run == RUN_ARRAY) {
+            return queue->array[at];
         }
-        return at == 0 || ends_pass() ? bounds[QUEUE_LOOP_START] : after(at);
+        return at == 0 ? queue->bounds[QUEUE_LOOP_START] : after(at);
     }
-    if (pending == 0) {
+    struct queue *const queue = self();
+    if (queue->pending == 0) {
         return NONE;
     }
-    uint8_t position = (uint8_t)(next_available - pending);
+    uint8_t position = (uint8_t)(queue->next_available - queue->pending);
     return position < QUEUE_FIRST || position > QUEUE_LAST ? (uint8_t)(position + QUEUE_LAST) : position;
 }
 
 /* What was chosen has begun. */
 static NOINLINE void advance(void)
 {
-    executing = choose();
-    due = END_NOT;
-    if (preempting != NONE) {
-        preempting = NONE;
-    } else if (run != RUN_NOTHING && !is_over()) {
-        if (ends_pass()) {
-            if (passes != 0) {
-                passes--;
+    const uint8_t chosen = choose();
+    struct queue *queue = self();
+    queue->executing = chosen;
+    queue->due = END_NOT;
+    if (queue->preempting != NONE) {
+        queue->preempting = NONE;
+    } else if (!is_over()) {
+        const bool ends = ends_pass();
+        queue = self();
+        if (ends) {
+            if (queue->passes != 0) {
+                queue->passes--;
             }
-            at = 0;
+            queue->at = 0;
         }
-        at = run == RUN_LOOP ? executing : (uint8_t)(at + 1);
-        if (last_of_loop) {
+        queue->at = queue->run == RUN_LOOP ? queue->executing : (uint8_t)(queue->at + 1);
+        if (queue->last_of_loop) {
             end_loop();
         }
     } else {
-        if (run != RUN_NOTHING) {
+        if (the_queue.run != RUN_NOTHING) {
             end_loop();
         }
-        pending--;
+        the_queue.pending--;
     }
 }
 
 /* Accounts for what the engine has begun; before anything changes what is chosen. */
 static NOINLINE bool note_begun(void)
 {
-    if (begun == engine_commands_begun()) {
+    struct queue *const queue = self();
+    if (queue->begun == engine_commands_begun()) {
         return false;
     }
-    begun++;
+    queue->begun++;
     advance();
     return true;
 }
@@ -126,42 +152,50 @@ static NOINLINE bool note_begun(void)
 static NOINLINE bool offer(void)
 {
     const uint8_t position = choose();
-    engine_offer(position == NONE ? 0 : &entries[position]);
+    engine_offer(position == NONE ? 0 : entry_at(position));
     return note_begun();
 }
 
 bool queue_poll(void)
 {
     const bool changed = note_begun();
-    if (due != END_NOT && engine_next(due == END_GRACEFULLY)) {
-        due = END_NOT;
+    if (the_queue.due != END_NOT && engine_next(the_queue.due == END_GRACEFULLY)) {
+        the_queue.due = END_NOT;
     }
-    if (run != RUN_NOTHING && is_over() && !queue_is_executing()) {
+    if (the_queue.run != RUN_NOTHING && is_over() && !queue_is_executing()) {
         end_loop();
     }
-    return offer() || changed;
+    return offer() | changed;
+}
+
+/* One revolution each, else the session defaults. */
+static NOINLINE void seed(uint8_t position, uint8_t last)
+{
+    the_queue.undo_position = 0;
+    for (; position <= last; position++) {
+        motion_command_t *const entry = entry_at(position);
+        session_template(&session, entry);
+        entry->count = settings.steps_per_rev;
+        entry->flags &= (uint8_t)~MOTION_PULSES;
+        if (settings.direction != 0) {
+            entry->flags |= MOTION_CCW;
+        }
+    }
 }
 
 void queue_init(void)
 {
-    queue_clear();
-    revolution(&entries[QUEUE_CONTINUOUS]);
-    revolution(&entries[QUEUE_ONE_SHOT]);
-    AT_BOOT_ZERO(array);
-    next_available = QUEUE_FIRST;
-    AT_BOOT_ZERO(pending);
-    preempting = NONE;
-    AT_BOOT_ZERO(due);
-    begun = engine_commands_begun();
-    end_loop();
+    AT_BOOT_ZERO(the_queue);
+    seed(QUEUE_CONTINUOUS, QUEUE_ONE_SHOT);
+    struct queue *const queue = self();
+    queue->next_available = QUEUE_FIRST;
+    queue->preempting = NONE;
+    queue->begun = engine_commands_begun();
 }
 
 void queue_clear(void)
 {
-    for (uint8_t position = QUEUE_FIRST; position <= QUEUE_LAST; position++) {
-        revolution(&entries[position]);
-    }
-    undo_position = 0;
+    seed(QUEUE_FIRST, QUEUE_LAST);
 }
 
 _Static_assert(STORE_QUEUE_BYTES == QUEUE_LAST * sizeof(motion_command_t), "the snapshot holds the entries");
@@ -188,7 +222,7 @@ status_t queue_restore(bool *saved)
         session = kept;
     }
     *saved = found == STORE_QUEUE_SAVED;
-    undo_position = 0;
+    the_queue.undo_position = 0;
     return STATUS_OK;
 }
 
@@ -196,13 +230,14 @@ status_t queue_restore(bool *saved)
 
 static void write(uint8_t position, const motion_command_t *command, bool added)
 {
-    undo_position = position;
-    undo_added = added;
+    struct queue *const queue = self();
+    queue->undo_position = position;
+    queue->undo_added = added;
     /* Both copies in one loop: time counts. */
-    uint8_t *to = (uint8_t *)&entries[position];
-    uint8_t *kept = (uint8_t *)&undo;
+    uint8_t *to = (uint8_t *)entry_at(position);
+    uint8_t *kept = (uint8_t *)&queue->undo;
     const uint8_t *from = (const uint8_t *)command;
-    for (uint8_t left = sizeof undo; left > 0; left--) {
+    for (uint8_t left = sizeof queue->undo; left > 0; left--) {
         *kept++ = *to;
         *to++ = *from++;
     }
@@ -213,12 +248,13 @@ status_t queue_add(const motion_command_t *command)
     if (estop_port_active()) {
         return STATUS_ESTOP;
     }
-    if (pending == QUEUE_LAST) {
+    if (the_queue.pending == QUEUE_LAST) {
         return STATUS_QUEUE_FULL;
     }
-    write(next_available, command, true);
-    next_available = after(next_available);
-    pending++;
+    write(the_queue.next_available, command, true);
+    struct queue *const queue = self();
+    queue->next_available = after(queue->next_available);
+    queue->pending++;
     (void)offer();
     return STATUS_OK;
 }
@@ -230,16 +266,18 @@ void queue_edit(uint8_t position, const motion_command_t *command)
 
 status_t queue_undo(void)
 {
-    const uint8_t position = undo_position;
+    const uint8_t position = the_queue.undo_position;
     if (position == 0 || position == queue_executing_position()) {
         return STATUS_NOTHING_TO_UNDO;
     }
-    entries[position] = undo;
-    undo_position = 0;
-    if (undo_added) {
-        next_available = position;
-        if (pending != 0) { /* the newest one: still among them */
-            pending--;
+    motion_command_t *const entry = entry_at(position);
+    struct queue *const queue = self();
+    *entry = queue->undo;
+    queue->undo_position = 0;
+    if (queue->undo_added) {
+        queue->next_available = position;
+        if (queue->pending != 0) { /* the newest one: still among them */
+            queue->pending--;
         }
     }
     (void)offer();
@@ -250,8 +288,9 @@ status_t queue_undo(void)
 
 status_t queue_preempt(uint8_t position)
 {
-    const status_t status = engine_check(&entries[position]);
-    return status == STATUS_OK ? queue_preempt_with(position, &entries[position]) : status;
+    const motion_command_t *const command = entry_at(position);
+    const status_t status = engine_check(command);
+    return status == STATUS_OK ? queue_preempt_with(position, command) : status;
 }
 
 status_t queue_preempt_with(uint8_t position, const motion_command_t *command)
@@ -259,22 +298,23 @@ status_t queue_preempt_with(uint8_t position, const motion_command_t *command)
     if (estop_port_active()) {
         return STATUS_ESTOP;
     }
-    entries[position] = *command;
-    preempting = position;
-    due = END_NOW;
+    *entry_at(position) = *command;
+    struct queue *const queue = self();
+    queue->preempting = position;
+    queue->due = END_NOW;
     (void)queue_poll();
     return STATUS_OK;
 }
 
 static bool is_continuous(void)
 {
-    return executing == QUEUE_CONTINUOUS && queue_is_executing();
+    return the_queue.executing == QUEUE_CONTINUOUS ? queue_is_executing() : false;
 }
 
 /* It runs, or is about to. */
 static NOINLINE bool becomes_continuous(void)
 {
-    return preempting == QUEUE_CONTINUOUS || is_continuous();
+    return the_queue.preempting == QUEUE_CONTINUOUS ? true : is_continuous();
 }
 
 void queue_follow(const motion_command_t *command)
@@ -294,12 +334,16 @@ void queue_throttle(int8_t rpm)
     if (!becomes_continuous()) {
         return;
     }
-    motion_command_t faster = entries[QUEUE_CONTINUOUS];
-    const int32_t wanted = (int32_t)command_rpm(&faster) + rpm;
-    faster.velocity = wanted < 1 ? 1u : (uint32_t)wanted;
-    faster.flags &= (uint8_t)~MOTION_CYCLE;
-    if (engine_check(&faster) == STATUS_OK) {
-        (void)queue_preempt_with(QUEUE_CONTINUOUS, &faster);
+    motion_command_t *continuous = &entries[QUEUE_CONTINUOUS];
+    NEAR(continuous);
+    const uint32_t velocity = continuous->velocity;
+    const uint8_t flags = continuous->flags;
+    const int32_t wanted = (int32_t)command_rpm(continuous) + rpm;
+    continuous->velocity = wanted < 1 ? 1u : (uint32_t)wanted;
+    continuous->flags = flags & (uint8_t)~MOTION_CYCLE;
+    if (queue_preempt(QUEUE_CONTINUOUS) != STATUS_OK) { /* too fast: it stays as it is */
+        continuous->velocity = velocity;
+        continuous->flags = flags;
     }
 }
 
@@ -313,7 +357,7 @@ static NOINLINE status_t may_run(uint8_t first, uint8_t last)
         return STATUS_ESTOP;
     }
     do {
-        status = engine_check(&entries[first]);
+        status = engine_check(entry_at(first));
         if (first == last) {
             break;
         }
@@ -324,27 +368,31 @@ static NOINLINE status_t may_run(uint8_t first, uint8_t last)
 
 static NOINLINE void begin_run(run_t what)
 {
-    run = what;
-    at = 0;
-    last_of_loop = false;
+    struct queue *const queue = self();
+    queue->run = what;
+    queue->at = 0;
+    queue->last_of_loop = false;
     (void)offer();
 }
 
 status_t queue_loop_bound(queue_bound_t bound, uint8_t position)
 {
-    const uint8_t other = bounds[1 - bound];
+    struct queue *const queue = self();
+    const uint8_t other = queue->bounds[bound ^ 1];
+    const uint8_t before = queue->bounds[bound];
     if (position == other) {
         return STATUS_LOOP_BOUNDS;
     }
+    queue->bounds[bound] = position;
     if (other != 0) {
-        const status_t status = bound == QUEUE_LOOP_START ? may_run(position, other) : may_run(other, position);
+        const status_t status = may_run(queue->bounds[QUEUE_LOOP_START], queue->bounds[QUEUE_LOOP_FINISH]);
         if (status != STATUS_OK) {
+            queue->bounds[bound] = before;
             return status;
         }
-    }
-    bounds[bound] = position;
-    if (other != 0 && run != RUN_LOOP) {
-        begin_run(RUN_LOOP);
+        if (queue->run != RUN_LOOP) {
+            begin_run(RUN_LOOP);
+        }
     }
     (void)offer();
     return STATUS_OK;
@@ -354,8 +402,8 @@ NOINLINE status_t queue_loop_from_first(uint8_t finish)
 {
     const status_t status = may_run(QUEUE_FIRST, finish);
     if (status == STATUS_OK) {
-        bounds[QUEUE_LOOP_START] = QUEUE_FIRST;
-        bounds[QUEUE_LOOP_FINISH] = finish;
+        the_queue.bounds[QUEUE_LOOP_START] = QUEUE_FIRST;
+        the_queue.bounds[QUEUE_LOOP_FINISH] = finish;
         begin_run(RUN_LOOP);
     }
     return status;
@@ -363,41 +411,42 @@ NOINLINE status_t queue_loop_from_first(uint8_t finish)
 
 void queue_loop_passes(uint16_t count)
 {
-    passes = count;
+    the_queue.passes = count;
     (void)offer();
 }
 
 status_t queue_array_set(uint8_t entry, uint8_t position)
 {
     if (position != 0) {
-        const status_t status = engine_check(&entries[position]);
+        const status_t status = engine_check(entry_at(position));
         if (status != STATUS_OK) {
             return status;
         }
     }
-    array[entry] = position;
+    the_queue.array[entry] = position;
     (void)offer();
     return STATUS_OK;
 }
 
 uint8_t queue_array(uint8_t entry)
 {
-    return array[entry];
+    return the_queue.array[entry];
 }
 
 NOINLINE status_t queue_array_run(uint16_t count)
 {
-    if (array[0] == 0) {
+    const uint8_t *array = the_queue.array;
+    if (*array == 0) {
         return STATUS_ARRAY_EMPTY;
     }
-    for (uint8_t entry = 0; entry < QUEUE_ARRAY && array[entry] != 0; entry++) {
-        const status_t status = may_run(array[entry], array[entry]);
+    do {
+        const status_t status = may_run(*array, *array);
         if (status != STATUS_OK) {
             return status;
         }
-    }
+    } while (*++array != 0);
     end_loop();
-    passes = count;
+    self()->passes = count;
     begin_run(RUN_ARRAY);
     return STATUS_OK;
 }
@@ -406,7 +455,7 @@ NOINLINE void queue_loop_end(void)
 {
     end_loop();
     if (is_continuous()) {
-        due = END_GRACEFULLY;
+        the_queue.due = END_GRACEFULLY;
     }
     (void)queue_poll();
 }
@@ -416,9 +465,10 @@ NOINLINE void queue_loop_end(void)
 static void forget(void)
 {
     end_loop();
-    pending = 0;
-    preempting = NONE;
-    due = END_NOT;
+    struct queue *const queue = self();
+    queue->pending = 0;
+    queue->preempting = NONE;
+    queue->due = END_NOT;
     engine_offer(0);
 }
 
@@ -438,10 +488,13 @@ void queue_stop_graceful(accel_code_t decel, bool linear)
  * continuous motion is, it shall end too; and a loop that it has interrupted executes one more command. */
 static void end_running(end_t how)
 {
-    if (!engine_next(how == END_GRACEFULLY) && is_continuous()) {
-        due = how;
+    const bool ended = engine_next(how == END_GRACEFULLY);
+    const bool continuous = is_continuous();
+    struct queue *const queue = self();
+    if (!ended && continuous) {
+        queue->due = how;
     }
-    last_of_loop = run != RUN_NOTHING && is_continuous();
+    queue->last_of_loop = queue->run != RUN_NOTHING && continuous;
 }
 
 void queue_next(void)
@@ -456,12 +509,12 @@ void queue_next_graceful(void)
 
 uint8_t queue_next_position(void)
 {
-    return next_available;
+    return the_queue.next_available;
 }
 
 uint8_t queue_pending(void)
 {
-    return pending;
+    return the_queue.pending;
 }
 
 bool queue_is_executing(void)
@@ -471,10 +524,10 @@ bool queue_is_executing(void)
 
 NOINLINE uint8_t queue_executing_position(void)
 {
-    return queue_is_executing() ? executing : 0;
+    return queue_is_executing() ? the_queue.executing : 0;
 }
 
 const motion_command_t *queue_entry(uint8_t position)
 {
-    return &entries[position];
+    return entry_at(position);
 }

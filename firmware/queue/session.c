@@ -6,17 +6,18 @@ session_t session;
 
 void session_init(void)
 {
+    session.flags = settings.full_step != 0 ? MOTION_CYCLE : MOTION_CYCLE | MOTION_PULSES;
+    session.velocity = settings.cycle_us;
     session_set_option(SESSION_SOFT_OPS, settings.soft_ops);
     session_set_option(SESSION_CRC, settings.crc_mode);
     session_set_option(SESSION_ACK, settings.acknowledge);
-    session.velocity = settings.cycle_us;
-    session.flags = MOTION_CYCLE;
     session_set_linear(settings.ramp);
-    session_set_pulses(settings.full_step == 0);
 }
 
-static NOINLINE void set(uint8_t *bits, uint8_t bit, uint8_t on)
+/* In this order they are where the callers have them. */
+static NOINLINE void set(uint8_t bit, uint8_t on, uint8_t *bits)
 {
+    NEAR(bits);
     uint8_t others = *bits | bit;
     if (!on) {
         others ^= bit;
@@ -26,19 +27,22 @@ static NOINLINE void set(uint8_t *bits, uint8_t bit, uint8_t on)
 
 NOINLINE void session_set_linear(uint8_t linear)
 {
-    set(&session.flags, MOTION_LINEAR, linear);
-    session.accel = settings.accel[linear];
-    session.decel = settings.decel[linear];
+    set(MOTION_LINEAR, linear, &session.flags);
+    /* Both of a pair are reached through one pointer, as far behind the first ones. */
+    const settings_t *values = (const settings_t *)((const uint8_t *)&settings + linear * sizeof(accel_code_t));
+    NEAR(values);
+    session.accel = values->accel[0];
+    session.decel = values->decel[0];
 }
 
 NOINLINE void session_set_option(uint8_t option, uint8_t on)
 {
-    set(&session.options, option, on);
+    set(option, on, &session.options);
 }
 
 void session_set_pulses(bool pulses)
 {
-    set(&session.flags, MOTION_PULSES, pulses);
+    set(MOTION_PULSES, pulses, &session.flags);
 }
 
 NOINLINE void session_template(const session_t *from, motion_command_t *command)

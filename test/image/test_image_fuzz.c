@@ -105,15 +105,16 @@ static look_t look(void)
     all.session.decel = board_peek16(board, (uint16_t)(session_at + 6));
     all.session.flags = board_peek8(board, (uint16_t)(session_at + 8));
     all.session.options = board_peek8(board, (uint16_t)(session_at + 9));
-    const uint16_t array = address_of("array");
+    enum { ARRAY_AT = 33 }; /* in struct queue, after two bytes that are looked at as well */
+    const uint16_t queue = address_of("the_queue");
     for (unsigned i = 0; i < QUEUE_ARRAY; i++)
-        all.array[i] = board_peek8(board, (uint16_t)(array + i));
+        all.array[i] = board_peek8(board, (uint16_t)(queue + ARRAY_AT + i));
     all.mode = image_peek("mode");
     all.idle = image_peek("the_store") == 0; /* its jobs, which stand first */
     if (all.idle)
         memcpy(all.eeprom, board_eeprom(board), sizeof all.eeprom);
-    all.next = image_peek("next_available");
-    all.pending = image_peek("pending");
+    all.next = board_peek8(board, queue);
+    all.pending = board_peek8(board, (uint16_t)(queue + 1));
     return all;
 }
 

@@ -199,12 +199,12 @@ class Texts(ToolTest):
 
 
 class Image(ToolTest):
-    """tools/check_size.py and tools/check_stack.py"""
+    """tools/check_size.py, tools/check_stack.py and tools/link_order.py"""
 
-    def build(self, source):
+    def build(self, source, *link):
         """Compiles and links a program."""
         self.write("t.c", source)
-        for step in (["-Os", "-fstack-usage", "-c", "t.c", "-o", "t.o"], ["t.o", "-o", "t.elf"]):
+        for step in (["-Os", "-fstack-usage", "-c", "t.c", "-o", "t.o"], ["t.o", "-o", "t.elf", *link]):
             subprocess.run([f"{AVR}gcc", "-mmcu=atmega328p", *step], cwd=self.folder, check=True)
 
     def size(self, flash, ram):
@@ -223,6 +223,19 @@ class Image(ToolTest):
         self.assertEqual(0, self.size(1000, 100))
         self.assertEqual(1, self.size(100, 100))
         self.assertEqual(1, self.size(1000, 99))
+
+    def test_an_order_is_found_in_which_calls_are_short(self):
+        far = '__attribute__((noinline, section(".text." #name))) void name(void) { __asm__(".rept 1500\\n nop\\n .endr"); '
+        self.build(
+            f"#define FAR(name, more) {far} more; }}\n"
+            "FAR(one, ) FAR(two, ) FAR(three, one()) FAR(four, two()) int main(void) { three(); four(); return 0; }",
+            "-mrelax", "-Wl,-Map=t.map",
+        )
+        code, text = self.tool(
+            "link_order.py", "t.elf", "--map", "t.map", "--objdump", f"{AVR}objdump", "--rounds", "300", "--write", "order"
+        )
+        self.assertEqual((0, "order: 0 long calls, 4 before\n"), (code, text))
+        self.assertIn("*(.text.one .text.one.*)", (self.folder / "order").read_text(encoding="utf-8"))
 
     def test_frames_add_up_along_the_deepest_path(self):
         self.build(
