@@ -16,6 +16,7 @@
 #include "motion/segment.h"
 
 #define io(reg) _SFR_IO_ADDR(reg)
+#define HOLD_PERIODS 4
 #define MODE15_STOPPED (1 << WGM13 | 1 << WGM12) /* without a clock */
 
         .section .segments, "aw", @nobits
@@ -98,7 +99,6 @@ low_byte_over:
         rjmp    return
 
 empty:
-        ldi     r24, 0
         rjmp    ring_empty
 
 segment_over:
@@ -150,6 +150,7 @@ early:
         /* What would be too long for the last period is done before it. T = two more waits, not one. */
         bst     r24, SEGMENT_EARLY_SHIFT
         account
+next_wait:
 2:      sbic    io(EIFR), INTF0
         rjmp    stop_early_again
         sbis    io(TIFR1), TOV1
@@ -158,7 +159,8 @@ early:
         brtc    3f
         clt
         rjmp    2b
-3:
+3:      tst     r31
+        breq    near_run_out
         buffers
         sbic    io(TIFR1), TOV1
         rcall   late
@@ -173,6 +175,8 @@ late:
         ret
 near_early_empty:
         rjmp    early_empty
+near_run_out:
+        rjmp    run_out
 
         /* dir belongs to the segment whose only period has just begun: the last pulse before it has fallen. */
 set_dir:
@@ -219,41 +223,51 @@ uncount:                                /* r24: periods due, r30: what was to be
         sts     step_flags, r24
         rjmp    leave
 
-early_empty:
-        lsr     r24
-        lsr     r24
-        lsr     r24
-        dec     r24                     /* one has been waited for */
-ring_empty:                             /* r24: periods of the segment that are still due */
-        mov     r31, r24
+        /* Planned motion is not over but the planner is behind: the interval is repeated, so that no pulse is lost. Several
+         * at once, or short periods would leave no time to plan. */
+early_empty:                            /* r24: the early bits; one period has been waited for */
+        look_for_estop
+        lds     r31, step_hold
+        subi    r31, HOLD_PERIODS
+        brcs    1f
+        sts     step_hold, r31
+        lds     r31, step_held
+        subi    r31, -HOLD_PERIODS
+        sts     step_held, r31
+        ldi     r31, HOLD_PERIODS - 1   /* as early as before (GPIOR1 is 0) */
+        out     io(GPIOR0), r31
+        rjmp    leave
+1:      ldi     r31, 0                  /* no segment: silence, when what is due has been played */
+        bst     r24, SEGMENT_EARLY_SHIFT
+        cpi     r24, 1 << SEGMENT_EARLY_SHIFT
+        breq    run_out
+        rjmp    next_wait
+ring_empty:
         lds     r24, step_flags
         sbrc    r24, SEGMENT_SET_DIR_BIT
         rcall   set_dir
-        andi    r24, ~(SEGMENT_EARLY_MASK | (1 << SEGMENT_SET_DIR_BIT))
+        andi    r24, ~(1 << SEGMENT_SET_DIR_BIT)
         sts     step_flags, r24
-        ldi     r30, 0
-        out     io(GPIOR1), r30
-        out     io(GPIOR0), r31
         look_for_estop
-        tst     r31
-        breq    1f
-        rjmp    leave                   /* they are counted as usual */
-1:
-        /* Planned motion is not over but the planner is behind: repeat the interval, so that no pulse is lost. */
         lds     r24, step_hold
-        subi    r24, 1
-        brcs    run_out
+        ldi     r31, HOLD_PERIODS
+        cp      r24, r31
+        brsh    2f
+        mov     r31, r24
+        tst     r24
+        breq    run_out
+2:      out     io(GPIOR0), r31         /* (GPIOR1 is 0) */
+        sub     r24, r31
         sts     step_hold, r24
         lds     r24, step_held
-        inc     r24
+        add     r24, r31
         sts     step_held, r24
-        ldi     r24, 1
-        out     io(GPIOR0), r24
         rjmp    leave
 run_out:
         ldi     r24, hi8(SEGMENT_SILENT)
         sts     OCR1BH, r24
         sts     OCR1BL, r24
+        ldi     r30, 0
         sts     motion_state, r30
         sts     TIMSK1, r30             /* from here on nobody counts: the main loop stops the timer */
         ldi     r24, 1
