@@ -84,6 +84,40 @@ static void test_stop_at_any_phase_of_fast_motion_keeps_count_and_pulse_width(vo
     }
 }
 
+/* STO-001: where a period hardly leaves time for anything but the step interrupt, and where it leaves more */
+static void test_stop_at_any_period_comes_at_once_and_keeps_count_and_pulse_width(void)
+{
+    for (unsigned ticks = 32; ticks < 130; ticks++) {
+        image_off();
+        image_power_on();
+        IMAGE_SET(ustep, 4); /* microseconds a full step are ticks a pulse */
+        IMAGE_SET(pulse_us, 1);
+        image_prompt();
+        char line[40];
+        snprintf(line, sizeof line, "m%s100000000vc%ua999d999", ticks & 1 ? "-" : "", ticks);
+        for (unsigned i = 0; i < 4; i++) {
+            image_train_clear();
+            train.keep = false;
+            int32_t before = image_position();
+            image_do(line);
+            image_run(20 * MS + i * 7919);
+            image_send("S\r");
+            image_sent();
+            uint64_t end = board_uart_last_sent(board);
+            image_run(200 * MS);
+            image_assert_holds(image_take_text(), "S\r\nSAC>");
+            if (train.last_rise > end + 2 * MS)
+                image_fail("%u ticks: expected no pulse 2 ms behind the line, saw one %llu us behind it", ticks,
+                           (unsigned long long)((train.last_rise - end) / US));
+            if (train.high_min != US || train.high_max != US)
+                image_fail("%u ticks: expected pulses of 16 ticks, saw %llu to %llu", ticks,
+                           (unsigned long long)train.high_min, (unsigned long long)train.high_max);
+            TEST_ASSERT_EQUAL(before + train.position, image_position());
+            assert_levels_at_rest();
+        }
+    }
+}
+
 /* STO-002 */
 static void test_both_stops_end_motion_pending_commands_and_waits(void)
 {
@@ -511,6 +545,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_capital_s_ends_the_pulses_at_once_and_nothing_pending_is_executed);
     RUN_TEST(test_stop_at_any_phase_of_fast_motion_keeps_count_and_pulse_width);
+    RUN_TEST(test_stop_at_any_period_comes_at_once_and_keeps_count_and_pulse_width);
     RUN_TEST(test_both_stops_end_motion_pending_commands_and_waits);
     RUN_TEST(test_small_s_ramps_down_with_the_sessions_decel);
     RUN_TEST(test_small_s_without_decel_ends_at_once);
