@@ -27,7 +27,8 @@ segments:
         .skip 256
 
         .section .bss
-        .global step_head, step_tail, step_flags, step_hold, step_held, step_idle, step_late, motion_state
+        .global step_clock, step_head, step_tail, step_flags, step_hold, step_held, step_idle, step_late, motion_state
+step_clock:   .skip 1
 step_head:    .skip 1
 step_tail:    .skip 1
 step_flags:   .skip 1
@@ -304,7 +305,7 @@ INT0_vect:
         ldi     r24, hi8(SEGMENT_SILENT)
         sts     OCR1BH, r24
         sts     OCR1BL, r24
-        ldi     r24, MODE15_STOPPED | (1 << CS10)
+        lds     r24, step_clock
         sts     TCCR1B, r24
         ldi     r24, MODE15_STOPPED
         nop
@@ -321,7 +322,7 @@ INT0_vect:
         .type INT1_vect, @function
 INT1_vect:
         push    r24
-        ldi     r24, MODE15_STOPPED | (1 << CS10)
+        lds     r24, step_clock
         sts     TCCR1B, r24
         cbi     io(EIMSK), INT1
         pop     r24

@@ -19,6 +19,10 @@
 /* Ticks between reading TCNT1 and the timer standing still, and a margin. */
 #define FREEZE_TICKS 16
 
+/* So near its end a period is waited for: 6 cycles a poll are longer than that, and than one that is reloaded early. */
+#define NEAR_END_TICKS 40
+#define END_POLLS 15
+
 /* Ticks between reading TCNT1 and the last of the buffers written, and a margin. */
 #define ARM_TICKS 64
 /* Where periods are short there is no time to look at all this with interrupts off. */
@@ -56,6 +60,11 @@ NOINLINE void step_port_init(void)
     TIMSK1 = 0;
     TCCR1B = 0;
     TCCR1A = 0;
+}
+
+void step_port_clock(bool external)
+{
+    step_clock = external ? MODE15_B | 1 << CS12 | 1 << CS11 | 1 << CS10 : RUNNING;
 }
 
 void step_port_dir(bool level)
@@ -112,7 +121,7 @@ void step_port_start(void)
     make_ready();
     uint8_t state = atomic_begin();
     if (EIMSK & 1 << INT0)
-        TCCR1B = RUNNING;
+        TCCR1B = step_clock;
     atomic_end(state);
 }
 
@@ -120,7 +129,7 @@ void step_port_release(void)
 {
     uint8_t state = atomic_begin();
     if (EIMSK & 1 << INT1) {
-        TCCR1B = RUNNING;
+        TCCR1B = step_clock;
         EIMSK &= (uint8_t)~(1 << INT1);
     }
     atomic_end(state);
@@ -157,48 +166,81 @@ uint16_t step_port_counter(void)
     return counter;
 }
 
+/* Interrupts are off, and the period that runs ends soon: takes the clock away right behind it. False: it has not ended, or
+ * Estop has come and knows better. */
+static inline __attribute__((always_inline)) bool freeze_behind_period(volatile timer1_t *timer)
+{
+    for (uint8_t polls = END_POLLS; polls && !(EIFR & 1 << INTF0); polls--) {
+        if (TIFR1 & 1 << TOV1) {
+            timer->control_b = MODE15_B;
+            return true;
+        }
+    }
+    return false;
+}
+
+/* The same where it does not end soon: at once, if no pulse is near. */
+static bool freeze_within_period(volatile timer1_t *timer, uint8_t tail)
+{
+    const segment_t *s = segment_at((uint8_t)(tail - SEGMENT_BYTES));
+    if (GPIOR0 == s->count_low && GPIOR1 == s->count_high) /* its first period is still to come */
+        s = segment_at((uint8_t)(tail - 2 * SEGMENT_BYTES));
+    uint16_t safe = s->match < FREEZE_TICKS ? 0 : (uint16_t)(s->match - FREEZE_TICKS);
+    if (tail != step_tail)
+        return false;
+    uint16_t now = timer->counter;
+    if (TIFR1 & 1 << TOV1)
+        return false;
+    if (now < safe) {
+        timer->control_b = MODE15_B;
+        return true;
+    }
+    return (uint16_t)(s->top - now) < NEAR_END_TICKS && freeze_behind_period(timer);
+}
+
+/* The same with an external clock, which may stand still: a pulse that has begun is completed with it, in reasonable time,
+ * or else with the internal one. */
+static bool freeze_external(volatile timer1_t *timer, bool patient)
+{
+    timer->control_b = MODE15_B;
+    __asm__ __volatile__("nop\n\tnop"); /* until the pin can be read */
+    if (!(PINB & 1 << 2))
+        return true;
+    timer->control_b = patient ? step_clock : RUNNING;
+    if (patient)
+        return false;
+    while (PINB & 1 << 2)
+        ;
+    timer->control_b = MODE15_B;
+    return true;
+}
+
 void step_port_halt(void)
 {
+    volatile timer1_t *const timer = timer1();
+    uint8_t rounds = 0;
     /* Until nobody counts: stopped, or playing uncounted silence. That may happen in here as well. */
     while (TIMSK1 & 1 << TOIE1) {
-        /* Looked at with interrupts on: with them off it would take longer than such a period. */
         uint8_t tail = step_tail;
-        const segment_t *loaded = segment_at((uint8_t)(tail - SEGMENT_BYTES));
-        const segment_t *before = segment_at((uint8_t)(tail - 2 * SEGMENT_BYTES));
-        uint8_t low = GPIOR0;
-        const segment_t *s = loaded;
-        if (low == s->count_low && GPIOR1 == s->count_high)
-            s = before; /* its last period is running */
-        bool fast = s->top < SEGMENT_EARLY1_BELOW_TICKS;
-        uint16_t match = s->match;
-        volatile timer1_t *const timer = timer1();
+        bool fast = timer->control_b == RUNNING &&
+                    segment_at((uint8_t)(tail - SEGMENT_BYTES))->top < SEGMENT_EARLY1_BELOW_TICKS;
+        bool frozen = true;
         cli();
-        if (timer->control_b == MODE15_B) {
-            TIMSK1 = 0; /* it is held */
+        if (fast) /* there is time for nothing but this */
+            frozen = freeze_behind_period(timer);
+        else if (timer->control_b == MODE15_B) /* it is held */
             EIMSK &= (uint8_t)~(1 << INT1);
-            sei();
-            return;
-        }
-        if (tail == step_tail && low == GPIOR0 && !(TIFR1 & 1 << TOV1)) {
-            if (fast) {
-                /* A pulse is due or there, and over in a moment: freeze right behind it. */
-                while (!(TIFR1 & 1 << TOV1))
-                    if (EIFR & 1 << INTF0)
-                        goto let_pass; /* it knows better */
-            } else if ((uint16_t)(timer->counter + FREEZE_TICKS) >= match) { /* (SEGMENT_SILENT is the highest) */
-                goto let_pass;
-            }
-            timer->control_b = MODE15_B; /* no clock: nothing moves from here on */
+        else if (step_clock != RUNNING)
+            frozen = freeze_external(timer, --rounds != 0);
+        else
+            frozen = freeze_within_period(timer, tail);
+        if (frozen)
             TIMSK1 = 0;
-            sei();
-            return;
-        }
-    let_pass: /* a pulse is due or there, or Estop */
         sei();
-        __asm__ __volatile__("nop\n\tnop");
     }
-    while (PINB & 1 << 2)
-        ; /* Estop's last pulse */
+    for (uint16_t polls = 1; PINB & 1 << 2; polls++) /* Estop's last pulse */
+        if (polls == 0)
+            TCCR1B = RUNNING; /* the external clock stands still */
     TCCR1B = MODE15_B;
 }
 

@@ -131,6 +131,7 @@ void engine_init(void)
     certain_centi = (130000000u >> basis.factor_log2) / basis.ramp.steps_per_rev;
     engine.width_ticks = (uint16_t)settings.pulse_us * TICKS_PER_US;
     step_port_init();
+    step_port_clock(!settings.internal_clock);
 }
 
 /* -- the ring -------------------------------------------------------------------------------------------------- */

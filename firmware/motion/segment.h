@@ -47,6 +47,7 @@ typedef struct {
 } segment_t;
 
 extern segment_t segments[SEGMENT_COUNT];
+extern volatile uint8_t step_clock; /* written by the main loop: TCCR1B while the timer runs */
 extern volatile uint8_t step_head;  /* written by the main loop: offset of the next free slot */
 extern volatile uint8_t step_tail;  /* written by the interrupt: offset of the next segment to load */
 extern volatile uint8_t step_flags; /* written by the interrupt: flags of the loaded segment */

@@ -10,6 +10,10 @@
 
 void step_port_init(void);
 
+/* Which clock the timer is started with from now on: the CPU's, or rising edges of the xclk post, at most 6.4 MHz. That one
+ * may stand still at any time: then nothing moves, and nobody waits for it. */
+void step_port_clock(bool external);
+
 /* Level of the dir pin, at once. Only in standstill. */
 void step_port_dir(bool level);
 

@@ -420,6 +420,11 @@ void step_port_init(void)
     p.counting = false;
 }
 
+void step_port_clock(bool external)
+{
+    (void)external;
+}
+
 void step_port_dir(bool level)
 {
     set_dir(p.now, level);
