@@ -19,10 +19,11 @@
 #define TAIL_TICKS 320u          /* the end of the closing interval, on which a following command is joined */
 #define SHORTEST_PIECE_TICKS 128u
 #define RUN_MAX_PERIODS 65000u
-#define AHEAD_PERIODS 12u        /* silence begun before planning; when the last one begins, the next segment is there */
-#define AHEAD_TICKS (AHEAD_PERIODS * 2048u)      /* it lasts before a profile with ramps is planned: 1.5 ms */
-#define AHEAD_LONG_TICKS (AHEAD_PERIODS * 4096u) /* twice that, where possible */
-#define AHEAD_SHORT_TICKS (AHEAD_PERIODS * 1000u) /* and one without ramps */
+#define AHEAD_PERIOD_TICKS 2048u /* silence begun before planning; when its last period begins, the next segment is there */
+#define AHEAD_PERIODS 12u        /* 1.5 ms, in which a harmonic profile is planned ... */
+#define AHEAD_TICKS (AHEAD_PERIODS * AHEAD_PERIOD_TICKS)
+#define AHEAD_LONG_PERIODS 24u   /* ... and 3 ms, for a linear one and wherever possible */
+#define AHEAD_LONG_TICKS (AHEAD_LONG_PERIODS * AHEAD_PERIOD_TICKS)
 #define CUT_KEEP_TICKS 49152u    /* motion left to run while a deceleration is planned */
 #define CRUISE_GROUP_TICKS 4096u /* shortest run of a cruise whose interval has a fraction */
 #define JOIN_TICKS 18000u         /* before the tail: to plan a command and emit its first intervals */
@@ -31,17 +32,17 @@
 #define JOIN_SOON_TICKS 160000u   /* before the tail: when that is done at the earliest */
 #define START_TICKS 12000u       /* in the ring before the timer runs */
 #define START_PERIODS 4u         /* and at least so many: a segment is loaded when the one before it begins */
-#define RING_REFILL 12u          /* free segments for a block to be gone on with */
-#define RING_RESERVE 4u          /* segments that one step of emission may need */
+#define RING_REFILL (12u * SEGMENT_BYTES) /* free segments for a block to be gone on with */
+#define RING_RESERVE (4u * SEGMENT_BYTES) /* segments that one step of emission may need */
 
 /* What comes next of the command being emitted. */
 typedef enum {
-    STAGE_REST, /* nothing: all of it is in the ring or played */
     STAGE_LEAD, /* start wait and first pulse */
     STAGE_RUN,  /* the intervals between its pulses */
     STAGE_TAIL, /* the end of its closing interval */
     STAGE_GAP,  /* the interval in which the velocity stays in play */
     STAGE_END,
+    STAGE_REST, /* nothing: all of it is in the ring or played */
 } stage_t;
 
 static struct {
@@ -61,8 +62,7 @@ static struct {
     uint16_t ahead_ticks; /* part of the next interval that has been emitted as silence */
     bool dir_due;         /* the next single period sets the dir pin */
 
-    uint32_t closing_chunks; /* closing interval of the last command emitted: so many PROFILE_CHUNK_TICKS ... */
-    uint16_t closing_ticks;  /* ... and these */
+    uint32_t closing_us;     /* closing interval of the last command emitted, whole microseconds */
     uint16_t tail_ticks;     /* its end */
     bool tail_fast;          /* too fast for a tail: a following command lengthens the last run instead */
     uint8_t tail_offset;     /* the tail's segment, while stage is REST, GAP or END */
@@ -81,7 +81,7 @@ static struct {
     bool single; /* the ring plays single pulses */
 } engine;
 static profile_basis_t basis;
-static uint32_t certain_centi;   /* steepest linear ramp whose first interval is longer than AHEAD_LONG_TICKS */
+static uint16_t certain_accel;   /* steepest linear ramp to 100 RPM whose first interval is surely longer than that silence */
 static motion_command_t command; /* being emitted or played */
 static profile_t profile;        /* what is left of the command to be emitted */
 static ramp_t ramp;
@@ -128,7 +128,8 @@ void engine_init(void)
     engine.v_in_play = basis.v_slow;
     engine.in_play_cycle_us = 0;
     engine.gap_off = false;
-    certain_centi = (130000000u >> basis.factor_log2) / basis.ramp.steps_per_rev;
+    /* sqrt(3.217e15 / (sprf * F * accel)) ticks; with so many steps there is one at least. */
+    certain_accel = (uint16_t)(basis.ramp.steps_per_rev < 200 ? 0 : (1300000u >> basis.factor_log2) / basis.ramp.steps_per_rev);
     engine.width_ticks = (uint16_t)settings.pulse_us * TICKS_PER_US;
     step_port_init();
     step_port_clock(!settings.internal_clock);
@@ -166,35 +167,49 @@ static bool is_silent(const segment_t *s)
     return s->match == SEGMENT_SILENT;
 }
 
-static uint8_t ring_free(void)
+/* In bytes. One slot stays empty; the loaded segment and the one before it are still needed for the position. */
+static NOINLINE uint8_t ring_free(void)
 {
-    /* One slot stays empty; the loaded segment and the one before it are still needed for the position. */
-    uint8_t used = (uint8_t)(step_head - step_tail) / SEGMENT_BYTES;
-    return (uint8_t)(SEGMENT_COUNT - 3u - used);
+    return (uint8_t)((SEGMENT_COUNT - 3u) * SEGMENT_BYTES - (uint8_t)(step_head - step_tail));
 }
 
-/* Pulses of the running command that are not in the ring yet, its closing interval apart. */
-static uint32_t profile_pulses_left(void)
+/* So many of them in one run. */
+static uint16_t run_of(uint32_t periods)
 {
-    return profile.accel_pulses + profile.cruise_pulses + profile.decel_pulses;
+    return periods > RUN_MAX_PERIODS ? RUN_MAX_PERIODS : (uint16_t)periods;
+}
+
+/* Pulses of the running command that are not in the ring yet, the first RUN_MAX_PERIODS of them. */
+static NOINLINE uint16_t pulses_left(void)
+{
+    return run_of(profile.accel_pulses + profile.cruise_pulses + profile.decel_pulses);
 }
 
 /* Those of them that come after the next `planned` ones and may be repeated if the ring runs empty. */
 static NOINLINE uint8_t pulses_to_come(uint16_t planned)
 {
-    uint32_t left = profile_pulses_left();
+    uint16_t left = pulses_left();
     if (left <= planned)
         return 0;
-    left -= planned;
-    return left > 255 ? 254 : (uint8_t)(left - 1);
+    left = (uint16_t)(left - planned - 1);
+    return (uint8_t)(left > 254 ? 254 : left);
 }
 
-static void add_pulses(uint8_t flags, uint16_t pulses)
+/* Clockwise positive. */
+static NOINLINE int32_t signed_pulses(uint8_t flags, uint16_t pulses)
 {
-    if (flags & (1 << SEGMENT_CCW_BIT))
-        engine.emitted -= pulses;
-    else
-        engine.emitted += pulses;
+    return flags & (1 << SEGMENT_CCW_BIT) ? -(int32_t)pulses : (int32_t)pulses;
+}
+
+static NOINLINE void add_pulses(uint8_t flags, uint16_t pulses)
+{
+    engine.emitted += signed_pulses(flags, pulses);
+}
+
+/* Of a segment, so many periods. */
+static NOINLINE int32_t pulses_of(const segment_t *s, uint16_t periods)
+{
+    return is_silent(s) ? 0 : signed_pulses(s->flags, periods);
 }
 
 /* Is the one-period segment at `offset` being played, or over? (It is loaded one period before it begins, and what comes
@@ -231,12 +246,6 @@ static NOINLINE uint16_t take(uint32_t *phase, uint16_t pulses)
     return (uint16_t)(pulses - some);
 }
 
-/* So many of them in one run. */
-static NOINLINE uint16_t run_of(uint32_t periods)
-{
-    return periods > RUN_MAX_PERIODS ? RUN_MAX_PERIODS : (uint16_t)periods;
-}
-
 /* The interrupt has repeated the last interval because the ring was empty: so many pulses fewer are to be made. */
 static void absorb_held(void)
 {
@@ -247,51 +256,52 @@ static void absorb_held(void)
     engine.faults |= ENGINE_FAULT_STARVED;
     add_pulses(step_flags, held);
     /* The cruise becomes shorter, or, where there is none, the ramps; the closing interval stays. */
-    uint32_t left = profile_pulses_left();
+    uint16_t left = pulses_left();
     uint8_t given = left > held ? held : left ? (uint8_t)(left - 1) : 0;
     engine.owed = (uint16_t)(engine.owed + held - given);
     take(&profile.decel_pulses, take(&profile.accel_pulses, take(&profile.cruise_pulses, given)));
 }
 
 /* So many pulses may be repeated from now on if the ring runs empty. */
-static void allow_hold(uint8_t pulses)
+static NOINLINE void allow_hold(uint8_t pulses)
 {
     uint8_t lock = atomic_begin();
     step_hold = pulses > step_held ? (uint8_t)(pulses - step_held) : 0; /* those held meanwhile will be given back */
     atomic_end(lock);
 }
 
-/* Before segments are appended: takes account of what has been played. True if held pulses were among it. */
+/* Before segments are appended: takes account of what has been played. True if held pulses were among it. Until they are
+ * appended no more pulses may be repeated than before: what a joined command's first pulse ends is a tail, not one of its
+ * intervals. */
 static NOINLINE bool settle(uint8_t hold)
 {
     look_for_end();
-    allow_hold(hold); /* first, so that what is held from here on can be given back */
+    if (hold < step_hold + step_held)
+        allow_hold(hold); /* first, so that what is held from here on can be given back */
     if (step_held == 0)
         return false;
     absorb_held();
     return true;
 }
 
-/* Appends so many periods of the phase, of so many ticks (0: 65,536). Runs too short to be reloaded in time (periods that
- * need an early reload, no more of them than are waited for) are stretched: their count stays exact. */
-static void push(uint16_t periods, uint16_t ticks, bool pulse)
+/* Appends a segment as it is: no early reload, pulses not accounted for. */
+static NOINLINE void append(uint16_t periods, uint16_t top, uint16_t match, uint8_t flags)
 {
     segment_t *s = segment_at(step_head);
-    bool turn = false;
-    if (engine.dir_due && periods == 1) {
-        engine.dir_due = false;
-        turn = true;
-    }
-    uint8_t flags = (uint8_t)(engine.ramp_state | direction_flags(&command, turn));
-    settle(pulse ? pulses_to_come(0) : 0);
-    if (pulse) {
-        uint16_t given = engine.owed < periods ? engine.owed : periods;
-        engine.owed = (uint16_t)(engine.owed - given);
-        periods = (uint16_t)(periods - given);
+    s->top = top;
+    s->match = match;
+    s->count_low = (uint8_t)periods;
+    s->count_high = (uint8_t)((uint16_t)(periods - 1) >> 8);
+    s->flags = flags;
+    step_head = (uint8_t)(step_head + SEGMENT_BYTES);
+}
+
+/* Appends so many periods of so many ticks (0: 65,536), of any length. Runs too short to be reloaded in time (periods that
+ * need an early reload, no more of them than are waited for) are stretched: their count stays exact. */
+static NOINLINE void append_run(uint16_t periods, uint16_t ticks, bool pulse, uint8_t flags)
+{
+    if (pulse)
         add_pulses(flags, periods);
-    }
-    if (periods == 0)
-        return;
     uint16_t top = (uint16_t)(ticks - 1);
     uint8_t early = early_of(top);
     if (periods > early) {
@@ -300,12 +310,27 @@ static void push(uint16_t periods, uint16_t ticks, bool pulse)
     } else {
         top = SEGMENT_EARLY1_BELOW_TICKS - 1;
     }
-    s->top = top;
-    s->match = pulse ? (uint16_t)(top - engine.width_ticks) : SEGMENT_SILENT;
-    s->count_low = (uint8_t)periods;
-    s->count_high = (uint8_t)((uint16_t)(periods - 1) >> 8);
-    s->flags = flags;
-    step_head = (uint8_t)(step_head + SEGMENT_BYTES);
+    append(periods, top, pulse ? (uint16_t)(top - engine.width_ticks) : SEGMENT_SILENT, flags);
+}
+
+/* The same for periods of the phase, once what has been played is settled: pulses that were held are left out. */
+static void push(uint16_t periods, uint16_t ticks, bool pulse)
+{
+    bool turn = false;
+    if (periods == 1) {
+        turn = engine.dir_due;
+        engine.dir_due = false;
+    }
+    settle(pulse ? pulses_to_come(0) : 0);
+    if (pulse) {
+        uint16_t given = engine.owed < periods ? engine.owed : periods;
+        engine.owed = (uint16_t)(engine.owed - given);
+        periods = (uint16_t)(periods - given);
+    }
+    if (periods)
+        append_run(periods, ticks, pulse, (uint8_t)(engine.ramp_state | direction_flags(&command, turn)));
+    if (pulse)
+        allow_hold(pulses_to_come(0));
 }
 
 /* The interval that ends with the pulse of the segment at `offset`: its period and the silence before it. */
@@ -329,20 +354,13 @@ static uint32_t ticks_between(uint8_t offset, uint16_t periods, uint8_t end)
     return ticks;
 }
 
-static int32_t signed_pulses(const segment_t *s, uint16_t pulses)
-{
-    if (is_silent(s))
-        return 0;
-    return s->flags & (1 << SEGMENT_CCW_BIT) ? -(int32_t)pulses : (int32_t)pulses;
-}
-
 /* Pulses in the segments from `offset` on, clockwise positive. */
 static int32_t pulses_from(uint8_t offset)
 {
     int32_t pulses = 0;
     while (offset != step_head) {
         const segment_t *s = segment_at(offset);
-        pulses += signed_pulses(s, (uint16_t)(counted_periods(s) + early_periods(s)));
+        pulses += pulses_of(s, (uint16_t)(counted_periods(s) + early_periods(s)));
         offset = (uint8_t)(offset + SEGMENT_BYTES);
     }
     return pulses;
@@ -361,25 +379,25 @@ int32_t engine_position(void)
     if (!step_idle) { /* otherwise its last period is running, or over */
         if (at.to_count == counted)
             running = segment_at((uint8_t)(loaded_offset - SEGMENT_BYTES));
-        to_come += signed_pulses(loaded, (uint16_t)(at.to_count + early_periods(loaded)));
+        to_come += pulses_of(loaded, (uint16_t)(at.to_count + early_periods(loaded)));
     }
     if (!at.pulse_high && !at.period_over)
-        to_come += signed_pulses(running, 1);
+        to_come += pulses_of(running, 1);
     return engine.emitted - to_come;
 }
 
 /* -- emission -------------------------------------------------------------------------------------------------- */
 
-/* Sets up an interval of so many chunks and ticks (which may be negative) that ends with a pulse (or not); emit() turns it
- * into segments. */
-static void set_interval(uint32_t chunks, int32_t ticks, bool pulse)
+/* Sets up an interval of so many ticks (which may be negative) and the silence that is set up already, which ends with a
+ * pulse (or not); emit() turns it into segments. */
+static void set_interval(int32_t ticks, bool pulse)
 {
     ticks -= engine.ahead_ticks;
     engine.ahead_ticks = 0;
-    chunks += (uint32_t)(ticks >> PROFILE_CHUNK_LOG2);
+    uint32_t chunks = engine.silence_chunks + (uint32_t)(ticks >> PROFILE_CHUNK_LOG2);
     uint16_t piece = (uint16_t)((uint16_t)ticks % PROFILE_CHUNK_TICKS);
     /* No piece too short, and what fits a period is one. */
-    while (chunks && (piece < SHORTEST_PIECE_TICKS || (chunks == 1 && piece < PROFILE_CHUNK_TICKS))) {
+    if (chunks == 1 || (chunks && piece < SHORTEST_PIECE_TICKS)) {
         piece = (uint16_t)(piece + PROFILE_CHUNK_TICKS);
         chunks--;
     }
@@ -388,41 +406,31 @@ static void set_interval(uint32_t chunks, int32_t ticks, bool pulse)
     engine.piece_pulse = pulse;
 }
 
+static NOINLINE void set_silence(uint32_t us)
+{
+    engine.silence_chunks = us >> PROFILE_CHUNK_US_LOG2;
+    set_interval((uint16_t)us % PROFILE_CHUNK_US * TICKS_PER_US, false);
+}
+
 /* Adds the carried fraction to a time; what remains is carried on. */
-static NOINLINE uint32_t take_carry(uint32_t ticks, uint16_t frac_q16)
+static uint32_t take_carry(uint32_t ticks, uint16_t frac_q16)
 {
     int32_t carry = engine.carry_q16 + frac_q16;
     engine.carry_q16 = carry & 0xFFFF;
     return (uint32_t)((int32_t)ticks + (carry >> 16));
 }
 
-/* push() without its cases: pulses of at least SEGMENT_EARLY1_BELOW_TICKS, many more to come. */
-static NOINLINE void append(uint16_t periods, uint16_t top, uint16_t width, uint8_t flags)
-{
-    segment_t *s = segment_at(step_head);
-    s->top = top;
-    s->match = (uint16_t)(top - width);
-    s->count_low = (uint8_t)periods;
-    s->count_high = 0;
-    s->flags = flags;
-    step_head = (uint8_t)(step_head + SEGMENT_BYTES);
-}
-
-static void append_silence(uint16_t periods, uint16_t top, uint8_t flags)
-{
-    append(periods, top, (uint16_t)(top - SEGMENT_SILENT), flags);
-}
-
-static NOINLINE void begin_ramp(motion_state_t state)
+static NOINLINE void begin_phase(motion_state_t state)
 {
     if (engine.ramp_state == state)
         return;
     engine.ramp_state = state;
-    profile_begin_ramp(&profile, &basis, state == MOTION_ACCEL, &ramp);
+    if (state != MOTION_CRUISE)
+        profile_begin_ramp(&profile, &basis, state == MOTION_ACCEL, &ramp);
 }
 
 /* Does the phase have its longer intervals first? */
-static NOINLINE bool speeds_up(void)
+static bool speeds_up(void)
 {
     return engine.ramp_state == MOTION_ACCEL && profile.faster;
 }
@@ -432,8 +440,8 @@ static NOINLINE bool speeds_up(void)
 static void emit_flat(uint16_t pulses, uint32_t ticks)
 {
     if (pulses == 1) {
-        if (ticks > 65535u || engine.ahead_ticks)
-            set_interval(0, (int32_t)ticks, true);
+        if (ticks > 65535u || engine.ahead_ticks || engine.silence_chunks)
+            set_interval((int32_t)ticks, true);
         else
             push(1, (uint16_t)ticks, true);
         return;
@@ -447,105 +455,86 @@ static void emit_flat(uint16_t pulses, uint32_t ticks)
     else if (pulses - longer <= early)
         longer = pulses;
     engine.carry_q16 += (int32_t)(int16_t)(ideal - longer) * 65536;
-    bool more = engine.ramp_state == MOTION_CRUISE || speeds_up();
-    for (uint8_t kinds = 0; kinds < 2; kinds++, more = !more) {
+    uint8_t more = engine.ramp_state == MOTION_CRUISE || speeds_up();
+    for (uint8_t kinds = 2; kinds; kinds--) {
         uint16_t some = more ? longer : (uint16_t)(pulses - longer);
         if (some)
             push(some, (uint16_t)(each + more), true);
+        more ^= 1;
     }
 }
 
-/* The phase's pulses that may be emitted: the last one of all has the closing interval. */
-static NOINLINE uint32_t pulses_of_phase(void)
+/* The phase's pulses that may be emitted, so many of them in one run: the last one of all has the closing interval. */
+static NOINLINE uint16_t pulses_of_phase(void)
 {
-    uint32_t most = profile_pulses_left() - 1;
-    return *engine.phase_left < most ? *engine.phase_left : most;
+    uint16_t most = (uint16_t)(pulses_left() - 1);
+    uint32_t left = *engine.phase_left;
+    return left < most ? (uint16_t)left : most;
 }
 
 /* Appends what the ring has room for of the block. */
-static NOINLINE void emit_block(void)
+static void emit_block(void)
 {
     uint8_t pulses = block.pulses;
     uint8_t runs = block.runs;
     uint16_t planned = (uint16_t)(runs * pulses);
     if (settle(pulses_to_come(planned))) {
-        uint32_t most = pulses_of_phase();
+        uint16_t most = pulses_of_phase();
         if (most < planned) /* held pulses have been taken from it */
-            block.runs = runs = (uint8_t)((uint16_t)most / pulses);
+            block.runs = runs = (uint8_t)(most / pulses);
     }
     block_append(&block);
     uint16_t made = (uint16_t)((uint8_t)(runs - block.runs) * pulses);
     take(engine.phase_left, made);
     add_pulses(block.flags, made);
+    allow_hold(pulses_to_come((uint16_t)(block.runs * pulses)));
     if (block.runs == 0)
         engine.carry_q16 += (int32_t)(block.shape & BLOCK_SPLIT ? block.carry_q16 : (uint32_t)block.carry_q16 * pulses);
 }
 
 /* What the block's runs do not say: the ticks carried so far, their segments' flags. */
-static void begin_block(void)
+static NOINLINE void begin_block(void)
 {
-    uint8_t split = block.top_q16 >> 16 >= BLOCK_SPLIT_TICKS - 1 ? BLOCK_SPLIT : 0;
-    block.shape = split;
-    if (speeds_up())
-        block.shape |= BLOCK_FASTER;
+    block_t *b = &block;
+    NEAR(b);
+    uint8_t split = b->top_q16 >> 16 >= BLOCK_SPLIT_TICKS - 1 ? BLOCK_SPLIT : 0;
+    b->shape = speeds_up() ? split | BLOCK_FASTER : split;
     uint32_t carry = 0;
     if (engine.carry_q16 > 0) { /* otherwise it waits for a single interval */
         carry = (uint32_t)engine.carry_q16;
         engine.carry_q16 = 0;
         if (!split || carry > UINT16_MAX) {
-            carry /= block.pulses; /* of each interval */
+            carry /= b->pulses; /* of each interval */
             if (split || carry > UINT16_MAX) { /* left by runs of more pulses */
-                block.top_q16 += carry / block.runs;
+                b->top_q16 += carry / b->runs;
                 carry = 0;
             }
         }
     }
-    block.carry_q16 = (uint16_t)carry;
-    block.width_ticks = engine.width_ticks;
-    block.flags = (uint8_t)(engine.ramp_state | direction_flags(&command, false));
+    b->carry_q16 = (uint16_t)carry;
+    b->width_ticks = engine.width_ticks;
+    b->flags = (uint8_t)(engine.ramp_state | direction_flags(&command, false));
 }
 
-/* The next intervals of the ramp of `ramp_state`: pulses all alike, a block, or some of the former before a block. */
-static void emit_ramp(uint32_t at_most)
+/* Intervals of the cruise, as ramp_next() has those of a ramp: one, or as many as there are, or a block. */
+static uint16_t cruise_next(uint16_t run, ramp_time_t *sum)
 {
-    if (engine.ahead_ticks || engine.dir_due || engine.owed)
-        at_most = 1;
-    uint32_t ticks = 0;
-    uint8_t pulses = 0;
-    do {
-        ramp_time_t sum;
-        uint16_t group = ramp_next(&ramp, at_most, &sum, &block);
-        if (block.runs) {
-            begin_block();
-            break;
-        }
-        ticks += take_carry(sum.ticks, sum.frac_q16);
-        pulses = (uint8_t)(pulses + group);
-        at_most -= group;
-    } while (ramp.rest && at_most);
-    take(engine.phase_left, pulses);
-    if (pulses)
-        emit_flat(pulses, ticks);
-}
-
-static void emit_cruise(uint32_t at_most)
-{
-    const profile_interval_t *interval = &profile.cruise;
-    uint8_t frac = (uint8_t)interval->ticks_q8;
-    if (interval->chunks > 1 || engine.ahead_ticks) {
-        take(engine.phase_left, 1);
-        set_interval(interval->chunks, (int32_t)take_carry(interval->ticks_q8 >> 8, (uint16_t)(frac << 8)), true);
-        return;
+    uint32_t chunks = profile.cruise.chunks;
+    uint32_t ticks_q8 = profile.cruise.ticks_q8;
+    ramp.rest = false;
+    if (chunks > 1) {
+        engine.silence_chunks = chunks;
+        run = 1;
+    } else if (chunks) {
+        ticks_q8 += (uint32_t)PROFILE_CHUNK_TICKS << 8;
     }
-    uint16_t ticks = (uint16_t)(interval->ticks_q8 >> 8);
-    if (interval->chunks)
-        ticks = (uint16_t)(ticks + PROFILE_CHUNK_TICKS);
-    uint16_t run = run_of(at_most);
+    uint16_t ticks = (uint16_t)(ticks_q8 >> 8);
+    uint8_t frac = (uint8_t)ticks_q8;
     if (frac == 0 || run < 8) {
-        take(engine.phase_left, run);
         uint32_t fraction = (uint32_t)frac * run;
-        emit_flat(run, take_carry((uint32_t)ticks * run + (fraction >> 8), (uint16_t)(fraction << 8)));
-        return;
+        sum->ticks = (uint32_t)ticks * run + (fraction >> 8);
+        sum->frac_q16 = (uint16_t)(fraction << 8);
+        return run;
     }
     /* Runs of two neighbouring values. */
     uint8_t pulses = 8;
@@ -556,57 +545,65 @@ static void emit_cruise(uint32_t at_most)
     }
     block.runs = (uint8_t)(run > 255u ? 255u : run);
     block.pulses = pulses;
-    block.top_q16 = (uint32_t)(ticks - 1u) << 16 | (uint16_t)(frac << 8);
+    block.top_q16 = (ticks_q8 - 256u) << 8;
     block.slope_q16 = 0;
     block.curve_q16 = 0;
-    begin_block();
+    return 0;
 }
 
-/* The interval after the last pulse of the command, which is of this phase: body, then tail. */
-static void begin_closing(void)
+/* The next intervals of the phase, as ramp_next() has them. */
+static NOINLINE uint16_t next_group(uint16_t at_most, ramp_time_t *sum)
 {
-    profile_t *p = &profile;
-    ramp_time_t last;
-    uint32_t chunks = 0;
-    if (engine.ramp_state == MOTION_CRUISE) {
-        chunks = p->cruise.chunks;
-        last.ticks = p->cruise.ticks_q8 >> 8;
-        last.frac_q16 = (uint16_t)(p->cruise.ticks_q8 << 8);
-    } else {
-        (void)ramp_next(&ramp, 1, &last, &block);
-    }
-    uint32_t ticks = take_carry(last.ticks, last.frac_q16);
-    chunks += ticks >> PROFILE_CHUNK_LOG2;
-    ticks &= PROFILE_CHUNK_TICKS - 1;
-    *engine.phase_left = 0;
-    engine.closing_chunks = chunks;
-    engine.closing_ticks = (uint16_t)ticks;
-    engine.tail_ticks = TAIL_TICKS;
-    if (chunks || ticks >= 2 * TAIL_TICKS)
-        set_interval(chunks, (int32_t)(ticks - TAIL_TICKS), false);
+    return engine.ramp_state == MOTION_CRUISE ? cruise_next(at_most, sum)
+                                              : ramp_next(&ramp, at_most, sum, &block);
+}
+
+/* The interval after the last pulse of the command, of so many ticks and the silence that is set up: body, then tail. */
+static void begin_closing(uint32_t ticks)
+{
+    engine.closing_us = (engine.silence_chunks << PROFILE_CHUNK_US_LOG2) + ticks / TICKS_PER_US;
+    uint16_t tail = TAIL_TICKS;
+    if (engine.silence_chunks || ticks >= 2 * TAIL_TICKS)
+        set_interval((int32_t)(ticks - TAIL_TICKS), false);
     else
-        engine.tail_ticks = (uint16_t)ticks;
-    engine.tail_fast = engine.tail_ticks < SEGMENT_EARLY1_BELOW_TICKS;
-    if (engine.tail_fast)
-        engine.tail_ticks = SHORTEST_PIECE_TICKS;
+        tail = (uint16_t)ticks;
+    engine.tail_fast = tail < SEGMENT_EARLY1_BELOW_TICKS;
+    engine.tail_ticks = engine.tail_fast ? SHORTEST_PIECE_TICKS : tail;
     engine.stage = STAGE_TAIL;
 }
 
-static void push_tail(void)
+/* The next intervals of the phase: pulses all alike, a block, or some of the former before a block. */
+static NOINLINE void emit_phase(void)
 {
-    engine.tail_offset = step_head;
-    engine.ramp_state = MOTION_STOP;
-    push(1, engine.tail_ticks, false);
-    engine.tail_awaited = true;
+    uint16_t at_most = pulses_of_phase();
+    bool closing = at_most == 0;
+    if (closing || engine.ahead_ticks || engine.owed)
+        at_most = 1;
+    uint32_t ticks = 0;
+    uint16_t pulses = 0;
+    do {
+        ramp_time_t sum;
+        uint16_t group = next_group((uint16_t)(at_most - pulses), &sum);
+        if (block.runs) {
+            begin_block();
+            break;
+        }
+        ticks += take_carry(sum.ticks, sum.frac_q16);
+        pulses = (uint16_t)(pulses + group);
+    } while (ramp.rest && pulses != at_most);
+    take(engine.phase_left, pulses);
+    if (closing)
+        begin_closing(ticks);
+    else if (pulses)
+        emit_flat(pulses, ticks);
 }
 
 /* What comes next, but for a block, which is only begun. False if there is nothing. */
 static bool emit_other(void)
 {
-    if (engine.silence_chunks) {
-        uint16_t periods = run_of(engine.silence_chunks);
-        take(&engine.silence_chunks, periods);
-        push(periods, PROFILE_CHUNK_TICKS, false);
+    uint16_t silence = (uint16_t)(RUN_MAX_PERIODS - take(&engine.silence_chunks, RUN_MAX_PERIODS));
+    if (silence) {
+        push(silence, PROFILE_CHUNK_TICKS, false);
         return true;
     }
     if (engine.piece_ticks) {
@@ -615,59 +612,47 @@ static bool emit_other(void)
         push(1, ticks, engine.piece_pulse);
         return true;
     }
-    profile_t *p = &profile;
     stage_t stage = engine.stage;
     if (stage == STAGE_RUN) {
         motion_state_t state = MOTION_ACCEL;
-        uint32_t *left = &p->accel_pulses;
+        uint32_t *left = &profile.accel_pulses;
         while (*left == 0 && state != MOTION_DECEL) {
             left++; /* cruise, deceleration */
             state++;
         }
-        if (engine.endless && state == MOTION_CRUISE && *left < UINT32_MAX / 2)
-            *left += UINT32_MAX / 2;
+        if (engine.endless && state == MOTION_CRUISE)
+            *left = UINT32_MAX / 2;
         engine.phase_left = left;
-        uint32_t at_most = pulses_of_phase();
-        if (state == MOTION_CRUISE)
-            engine.ramp_state = state;
-        else
-            begin_ramp(state);
-        if (at_most == 0)
-            begin_closing();
-        else if (state == MOTION_CRUISE)
-            emit_cruise(at_most);
-        else
-            emit_ramp(at_most);
+        begin_phase(state);
+        emit_phase();
         return true;
     }
     if (stage == STAGE_REST || (stage == STAGE_GAP && engine.next))
         return false; /* (it will be joined) */
-    if (stage == STAGE_LEAD) {
-        /* The start wait, then the first pulse: in a short period of its own, because the state changes when it begins. */
-        uint32_t us = command.start_wait_us;
+    uint32_t us = command.start_wait_us;
+    if (stage == STAGE_LEAD && us) {
         command.start_wait_us = 0;
-        engine.ramp_state = MOTION_STANDBY;
-        if (us) {
-            set_interval(us >> PROFILE_CHUNK_US_LOG2, (uint16_t)us % PROFILE_CHUNK_US * TICKS_PER_US, false);
-        } else {
-            push(1, setup_ticks(), true);
-            engine.stage = STAGE_RUN;
-        }
+        set_silence(us);
         return true;
     }
     engine.stage = (stage_t)(stage + 1);
-    if (stage == STAGE_TAIL) {
-        push_tail();
-        engine.v_in_play = p->v_exit;
-        engine.in_play_cycle_us = p->exit_cycle_us;
+    uint16_t ticks = SHORTEST_PIECE_TICKS;
+    if (stage == STAGE_LEAD) {
+        ticks = setup_ticks(); /* a short period of its own, because the state changes when it begins */
+    } else if (stage == STAGE_TAIL) {
+        engine.tail_offset = step_head;
+        engine.tail_awaited = true;
+        engine.ramp_state = MOTION_STOP;
+        engine.v_in_play = profile.v_exit;
+        engine.in_play_cycle_us = profile.exit_cycle_us;
+        ticks = engine.tail_ticks;
     } else if (stage == STAGE_GAP) {
         engine.ramp_state = MOTION_STANDBY;
         if (!engine.gap_off)
-            set_interval(engine.closing_chunks, engine.tail_fast ? engine.tail_ticks : engine.closing_ticks, false);
-    } else {
-        push(1, SHORTEST_PIECE_TICKS, false);
-        engine.stage = STAGE_REST;
+            set_silence(engine.closing_us);
+        return true;
     }
+    push(1, ticks, stage == STAGE_LEAD);
     return true;
 }
 
@@ -743,8 +728,9 @@ static void take_next(void)
     command = *engine.next;
     engine.next = 0;
     engine.begun++;
-    engine.endless = command.count == 0;
-    if (engine.endless) {
+    engine.endless = false;
+    if (command.count == 0) {
+        engine.endless = true;
         command.count = UINT32_MAX; /* its cruise is made longer as it is played */
         command.extra_pulses = 0;
         command.flags |= MOTION_PULSES;
@@ -752,37 +738,36 @@ static void take_next(void)
 }
 
 /* The first interval of most profiles is long, whatever the rest turns out to be: then the first pulse need not wait for
- * the planning. Returns how much of that interval may certainly be begun, from few operations, divided by AHEAD_PERIODS;
- * 0: plan first. */
-static uint16_t certain_ticks(void)
+ * the planning. Returns the state it belongs to if it is surely longer than the silence that planning takes, from few
+ * operations, otherwise MOTION_STANDBY. */
+static motion_state_t certain_state(void)
 {
-    uint32_t velocity = command.velocity;
-    bool is_cycle = command.flags & MOTION_CYCLE;
-    if (engine.v_in_play != basis.v_slow || is_held(&command))
-        return 0;
-    uint16_t ahead = AHEAD_LONG_TICKS / AHEAD_PERIODS;
-    if (command.accel == ACCEL_NONE) { /* the cruise interval, or that of the deceleration */
-        if (command.decel == ACCEL_NONE)
-            ahead = AHEAD_SHORT_TICKS / AHEAD_PERIODS;
-        return is_cycle && velocity >> basis.factor_log2 >= AHEAD_PERIODS * ahead / 8 ? ahead : 0;
+    const motion_command_t *c = &command;
+    NEAR(c);
+    uint32_t velocity = c->velocity;
+    bool is_cycle = c->flags & MOTION_CYCLE;
+    uint16_t accel = c->accel;
+    bool certain;
+    if (engine.v_in_play != basis.v_slow)
+        return MOTION_STANDBY;
+    if (accel == ACCEL_NONE) { /* the cruise interval, or that of the deceleration from there */
+        certain = is_cycle && velocity >> basis.factor_log2 >= AHEAD_LONG_TICKS / TICKS_PER_US + 8;
+        return certain ? MOTION_CRUISE : MOTION_STANDBY;
     }
     if (basis.slow_ticks < AHEAD_TICKS + SHORTEST_PIECE_TICKS)
-        return 0;
+        return MOTION_STANDBY;
     uint16_t least_rpm = 100;
-    uint32_t accel = accel_centi(command.accel);
-    if (!(command.flags & MOTION_LINEAR)) {
-        /* At least one step of acceleration, at slow speed. */
-        least_rpm = (uint16_t)(settings.slow_rpm + 2u + (uint16_t)(accel >> 6));
-        if (basis.slow_ticks < AHEAD_LONG_TICKS + SHORTEST_PIECE_TICKS)
-            ahead = AHEAD_TICKS / AHEAD_PERIODS;
-    } else if (basis.ramp.steps_per_rev < 200 || accel > certain_centi || command.accel > command.decel) {
-        /* c0 = sqrt(3.217e17 / (sprf * F * centi)) ticks is long enough; at least one step from 100 RPM on with 200 steps
-         * and more, and no less of acceleration than of deceleration in a truncated profile. */
-        return 0;
-    }
-    if (is_cycle ? velocity > UINT16_MAX || velocity * least_rpm > basis.us_rpm : velocity < least_rpm)
-        return 0;
-    return ahead;
+    /* At most. */
+    uint16_t whole = (uint16_t)(accel < ACCEL_CODE_WHOLE ? accel / 64u : accel - (ACCEL_CODE_WHOLE - 100u));
+    if (!(c->flags & MOTION_LINEAR))
+        least_rpm = (uint16_t)(settings.slow_rpm + 2u + whole); /* at least one step, at slow speed */
+    else if (whole > certain_accel || accel > c->decel)
+        return MOTION_STANDBY; /* (steeper than the deceleration: truncated, it may have no step) */
+    if (is_cycle)
+        certain = velocity <= UINT16_MAX && (uint32_t)least_rpm * (uint16_t)velocity <= basis.us_rpm;
+    else
+        certain = velocity >= least_rpm;
+    return certain ? MOTION_ACCEL : MOTION_STANDBY;
 }
 
 /* Emits enough to be played until the next round of the main loop, and where a ramp begins steeply, before the timer
@@ -806,26 +791,20 @@ static void fill(void)
 
 /* Without ramps a command is all cruise: it need not be planned either, if its interval is of whole ticks and the pulses
  * last for long enough. Emits them and returns how many; 0: plan first. */
-static uint16_t begin_cruise(void)
+static uint16_t begin_cruise(uint8_t flags)
 {
-    if (!has_no_ramps(&command) || is_held(&command))
+    if (!has_no_ramps(&command))
         return 0;
     uint32_t cycle_us = profile_cycle_us(&basis, &command);
     if (cycle_us > UINT16_MAX / TICKS_PER_US)
         return 0;
-    uint16_t ticks = (uint16_t)(cycle_us * TICKS_PER_US);
-    for (uint8_t halvings = basis.factor_log2; halvings; halvings--) {
-        if (ticks & 1)
-            return 0;
-        ticks /= 2;
-    }
-    uint32_t pulses = command.count - 1; /* at least: full steps have more */
-    uint16_t run = run_of(pulses);
-    if ((uint32_t)run * ticks < START_TICKS)
+    uint16_t full_ticks = (uint16_t)(cycle_us * TICKS_PER_US);
+    uint16_t ticks = (uint16_t)(full_ticks >> basis.factor_log2);
+    uint16_t run = run_of(command.count - 1); /* at least: full steps have more */
+    if ((uint16_t)(ticks << basis.factor_log2) != full_ticks || (uint32_t)run * ticks < START_TICKS)
         return 0;
-    profile.accel_pulses = profile.cruise_pulses = profile.decel_pulses = 0;
     engine.ramp_state = MOTION_CRUISE;
-    push(run, ticks, true);
+    append_run(run, ticks, true, (uint8_t)(MOTION_CRUISE | flags));
     play();
     return run;
 }
@@ -845,26 +824,28 @@ static void start_next(void)
     engine.stage = STAGE_LEAD;
     if (command.start_wait_us < 3072u) {
         uint16_t wait = (uint16_t)(command.start_wait_us * TICKS_PER_US);
-        uint16_t lead = setup_ticks();
-        uint8_t first_flags = flags;
+        motion_state_t state = held ? MOTION_STANDBY : certain_state();
+        uint8_t lead_flags = flags;
         engine.stage = STAGE_RUN;
-        uint16_t ahead = certain_ticks();
-        engine.ahead_ticks = (uint16_t)(ahead * AHEAD_PERIODS);
-        if (ahead)
-            flags = (uint8_t)(flags | (command.accel == ACCEL_NONE ? MOTION_CRUISE : MOTION_ACCEL));
+        flags |= (uint8_t)state;
+        uint16_t lead = DIR_SETUP_TICKS - 1;
         if (wait >= SHORTEST_PIECE_TICKS) {
-            append_silence(1, (uint16_t)(wait - 1), first_flags);
+            append(1, wait - 1, SEGMENT_SILENT, lead_flags);
         } else {
             lead = (uint16_t)(lead + wait);
-            first_flags = flags; /* known at once, not only when the pulse is over */
+            lead_flags = flags; /* known at once, not only when the pulse is over */
         }
-        append(1, (uint16_t)(lead - 1), engine.width_ticks, first_flags);
-        if (ahead) {
-            append_silence(AHEAD_PERIODS, (uint16_t)(ahead - 1), flags);
+        append(1, (uint16_t)(lead + engine.width_ticks), lead, lead_flags);
+        if (state) {
+            uint8_t periods = AHEAD_LONG_PERIODS;
+            if (!(command.flags & MOTION_LINEAR) && basis.slow_ticks < AHEAD_LONG_TICKS + SHORTEST_PIECE_TICKS)
+                periods = AHEAD_PERIODS;
+            engine.ahead_ticks = (uint16_t)(periods * AHEAD_PERIOD_TICKS);
+            append(periods, AHEAD_PERIOD_TICKS - 1, SEGMENT_SILENT, flags);
             play();
             engine_on_start();
-        } else {
-            cruised = begin_cruise();
+        } else if (!held) {
+            cruised = begin_cruise(flags);
         }
         add_pulses(flags, 1);
     } else {
@@ -885,55 +866,49 @@ static void start_next(void)
     }
 }
 
-/* Ticks of the start wait, saturated. */
-static uint32_t wait_ticks(uint32_t us)
-{
-    return us < UINT32_MAX / TICKS_PER_US ? us * TICKS_PER_US : UINT32_MAX;
-}
-
 /* Lets the next command follow the one that has been emitted: exactly one interval after its last pulse where there
  * is time to plan it and to emit its first intervals, otherwise as soon as possible after its end. Not long before, so
  * that the running command can still be cut without the next one. */
-static NOINLINE void join_next(void)
+static void join_next(void)
 {
+    look_for_end();
     step_snapshot_t at = step_port_snapshot();
     uint8_t loaded = (uint8_t)(at.tail - SEGMENT_BYTES);
     uint8_t offset = engine.tail_offset;
-    look_for_end();
     if (!engine.tail_awaited) {
         /* Not before the segment after the tail has begun. (An idle timer is dealt with by engine_poll.) */
-        uint8_t distance = (uint8_t)(loaded - offset);
-        bool waits = distance == SEGMENT_BYTES && at.to_count == counted_periods(segment_at(loaded));
-        if (!step_idle && has_begun(offset) && distance != 0 && !waits)
-            start_next();
+        if (step_idle || ((uint8_t)(loaded - offset) == SEGMENT_BYTES && at.to_count == counted_periods(segment_at(loaded))))
+            return;
+        start_next();
         return;
     }
     const motion_command_t *next = engine.next;
     if (is_held(next) || step_port_held())
         return; /* after its end; not before the running one may begin */
-    uint32_t ticks; /* until the tail begins */
+    uint8_t before = (uint8_t)(offset - SEGMENT_BYTES);
+    uint32_t ticks = ticks_between(loaded, at.to_count, offset); /* until the tail begins */
     if (loaded == offset) {
         /* It is loaded: what is left of the period before it. */
-        uint16_t top = segment_at((uint8_t)(offset - SEGMENT_BYTES))->top;
+        uint16_t top = segment_at(before)->top;
         uint16_t counter = step_port_counter();
         if (at.period_over || counter > top)
             return;
         ticks = top - counter;
-    } else {
-        ticks = ticks_between(loaded, at.to_count, offset);
     }
-    uint16_t needed = next->flags & MOTION_LINEAR ? JOIN_LINEAR_TICKS : JOIN_TICKS;
+    uint16_t needed = JOIN_TICKS;
     if (has_no_ramps(next))
         needed = JOIN_FLAT_TICKS;
+    else if (next->flags & MOTION_LINEAR)
+        needed = JOIN_LINEAR_TICKS;
     if (ticks > JOIN_SOON_TICKS || ticks < needed)
         return; /* later, or after its end */
     bool turns = is_ccw(next) != is_ccw(&command);
-    uint32_t wait = wait_ticks(next->start_wait_us);
-    bool waits = wait >= SHORTEST_PIECE_TICKS;
+    uint32_t wait_us = next->start_wait_us;
+    bool waits = wait_us >= SHORTEST_PIECE_TICKS / TICKS_PER_US;
     uint8_t flags = (uint8_t)(MOTION_STOP | direction_flags(next, turns));
     bool done;
-    if (engine.tail_fast && !turns && wait == 0) {
-        offset = (uint8_t)(offset - SEGMENT_BYTES); /* the last run */
+    if (engine.tail_fast && !turns && wait_us == 0) {
+        offset = before; /* the last run */
         done = step_port_extend(offset);
     } else {
         const segment_t *tail = segment_at(offset);
@@ -942,9 +917,10 @@ static NOINLINE void join_next(void)
         if (waits) {
             flags = tail->flags;
         } else {
-            top = (uint16_t)(top + wait);
-            if (turns && top < TURN_TICKS + engine.width_ticks)
-                top = (uint16_t)(TURN_TICKS + engine.width_ticks);
+            uint16_t least = (uint16_t)(TURN_TICKS + engine.width_ticks);
+            top = (uint16_t)(top + (uint8_t)wait_us * TICKS_PER_US);
+            if (turns && top < least)
+                top = least;
             match = (uint16_t)(top - engine.width_ticks);
         }
         done = step_port_arm(offset, top, match, flags);
@@ -955,14 +931,11 @@ static NOINLINE void join_next(void)
     take_next();
     drop_emission();
     engine.joined++;
-    /* Longer than the gap the wait means a start from slow speed. */
-    uint32_t chunks = wait >> PROFILE_CHUNK_LOG2;
-    if (chunks > engine.closing_chunks ||
-        (chunks == engine.closing_chunks && (uint16_t)wait % PROFILE_CHUNK_TICKS > engine.closing_ticks))
+    if (wait_us > engine.closing_us) /* longer than the gap: a start from slow speed */
         expire_gap();
+    engine.stage = STAGE_LEAD;
     if (waits) {
         engine.dir_due = turns;
-        engine.stage = STAGE_LEAD;
     } else {
         add_pulses(flags, 1);
         engine.stage = STAGE_RUN;
@@ -1002,9 +975,15 @@ NOINLINE bool engine_poll(void) /* (the benchmark measures it) */
         engine.faults |= ENGINE_FAULT_LATE;
     }
     if (engine.playing && step_idle) {
+        worked = true;
         if (!step_port_snapshot().period_over) {
             /* The last period is not over. */
-        } else if ((engine.stage == STAGE_REST || engine.stage == STAGE_GAP) && step_head == step_tail) {
+        } else if (step_head != step_tail) {
+            /* The planner was so late that the timer ran out of segments: go on where it stopped. */
+            if (engine.stage == STAGE_RUN)
+                engine.faults |= ENGINE_FAULT_STARVED;
+            step_port_start();
+        } else if (engine.stage == STAGE_REST || engine.stage == STAGE_GAP) {
             step_port_halt();
             engine.playing = false;
             engine.single = false;
@@ -1012,17 +991,12 @@ NOINLINE bool engine_poll(void) /* (the benchmark measures it) */
                 start_next();
             else
                 expire_gap();
-        } else if (step_head != step_tail) {
-            /* The planner was so late that the timer ran out of segments: go on where it stopped. */
-            if (engine.stage == STAGE_RUN)
-                engine.faults |= ENGINE_FAULT_STARVED;
-            step_port_start();
         }
-        worked = true;
     }
-    if (engine.next && engine.playing && !engine.single && (engine.stage == STAGE_GAP || engine.stage == STAGE_END || engine.stage == STAGE_REST))
+    if (engine.next && engine.playing && !engine.single && engine.stage > STAGE_TAIL)
         join_next();
-    /* Until the ring is half full nothing else is as urgent, within reason; then a step at a time. */
+    /* Until the ring is half full nothing else is as urgent, within reason; then a step at a time. (A timer that has run out
+     * of segments is started again as soon as there is one.) */
     uint8_t rounds = 6;
     if (engine.playing) {
         do {
@@ -1030,7 +1004,7 @@ NOINLINE bool engine_poll(void) /* (the benchmark measures it) */
             if (ring_free() < least || !emit())
                 break;
             worked = true;
-        } while (ring_free() > SEGMENT_COUNT / 2 && --rounds);
+        } while (ring_free() > SEGMENT_COUNT / 2 * SEGMENT_BYTES && !step_idle && --rounds);
     }
     return worked;
 }
@@ -1049,7 +1023,7 @@ uint8_t engine_commands_played(void)
 static bool running(void)
 {
     look_for_end();
-    return engine.tail_awaited || (engine.playing && (engine.stage == STAGE_LEAD || engine.stage == STAGE_RUN || engine.stage == STAGE_TAIL));
+    return engine.tail_awaited || (engine.playing && engine.stage <= STAGE_TAIL);
 }
 
 /* -- stopping ---------------------------------------------------------------------------------------------------- */
@@ -1087,40 +1061,43 @@ static NOINLINE uint32_t cut(void)
     uint8_t first = (uint8_t)(at.tail - SEGMENT_BYTES);
     uint8_t offset = first;
     uint16_t left = at.to_count;
-    uint32_t keep_ticks = CUT_KEEP_TICKS;
+    uint16_t keep_ticks = CUT_KEEP_TICKS;
     const segment_t *s;
-    uint8_t to_joint = (uint8_t)(engine.joined_offset - first);
     for (;;) {
         s = segment_at(offset);
         uint32_t ticks = ticks_of(s, left);
+        bool enough = ticks >= keep_ticks;
         uint8_t after = (uint8_t)(offset + SEGMENT_BYTES);
+        bool last = after == step_head;
         if (is_silent(s)) {
             if ((s->flags & SEGMENT_STATE_MASK) == MOTION_STOP)
                 return 0;
-        } else if ((ticks >= keep_ticks && (left > 1 || after != at.tail)) || after == step_head) {
-            /* (Not the last period of the loaded segment: what follows it may be loaded meanwhile.) */
-            uint16_t needed = (uint16_t)(keep_ticks / ticks_of(s, 1) + 4u);
-            if (needed < left)
-                left = needed;
-            break;
+        } else if (last || (enough && (left > 1 || after != at.tail))) {
+            break; /* (Not the last period of the loaded segment: what follows it may be loaded meanwhile.) */
         }
-        keep_ticks = keep_ticks > ticks ? keep_ticks - ticks : 0;
-        if (after == step_head)
+        if (last)
             return 0;
+        keep_ticks = enough ? 0 : (uint16_t)(keep_ticks - (uint16_t)ticks);
         offset = after;
         left = counted_periods(segment_at(offset));
     }
     uint32_t interval_ticks = interval_at(offset);
     if (interval_ticks > basis.slow_ticks + 1)
         return 0;
+    uint16_t needed = (uint16_t)(keep_ticks / (uint16_t)(s->top + 1u) + 4u);
+    if (needed > left)
+        needed = left;
     int32_t dropped = pulses_from((uint8_t)(offset + SEGMENT_BYTES));
-    engine.emitted -= dropped + signed_pulses(s, step_port_shorten(offset, left));
+    engine.emitted -= dropped + signed_pulses(s->flags, step_port_shorten(offset, needed));
     drop_emission();
-    if ((uint8_t)(offset - first) < to_joint) { /* what was joined never begins */
+    if ((uint8_t)(offset - first) < (uint8_t)(engine.joined_offset - first)) { /* what was joined never begins */
         engine.ended = (uint8_t)(engine.ended + engine.joined);
         engine.joined = 0;
     }
-    command.flags = (uint8_t)((command.flags & ~MOTION_CCW) | (s->flags & 1 << SEGMENT_CCW_BIT ? MOTION_CCW : 0));
+    uint8_t flags = command.flags & (uint8_t)~MOTION_CCW;
+    if (s->flags & 1 << SEGMENT_CCW_BIT)
+        flags |= MOTION_CCW;
+    command.flags = flags;
     return interval_ticks;
 }
 
@@ -1203,9 +1180,7 @@ void engine_single_pulse(bool ccw)
     engine.single = true;
     command.flags = ccw ? MOTION_CCW : 0;
     uint8_t flags = direction_flags(&command, true);
-    uint16_t width = engine.width_ticks;
-    append(1, (uint16_t)(TURN_TICKS + width - 1), width, flags);
-    add_pulses(flags, 1);
+    append_run(1, (uint16_t)(TURN_TICKS + engine.width_ticks), true, flags);
     play();
 }
 
@@ -1218,13 +1193,15 @@ motion_state_t engine_state(void)
 
 void engine_velocity(uint32_t *rpm, uint32_t *cycle_us)
 {
+    motion_state_t state = engine_state();
     uint32_t v = engine.v_in_play;
     uint32_t exact_cycle_us = engine.in_play_cycle_us;
-    motion_state_t state = engine_state();
     if (engine.playing && state == MOTION_CRUISE) {
-        exact_cycle_us = profile.cycle_us;
-        v = profile_rpm(&basis, &command) * 100u << basis.factor_log2;
-    } else if (engine.playing && (state == MOTION_ACCEL || state == MOTION_DECEL)) {
+        *rpm = profile_rpm(&basis, &command);
+        *cycle_us = profile.cycle_us;
+        return;
+    }
+    if (engine.playing && (state == MOTION_ACCEL || state == MOTION_DECEL)) {
         uint8_t offset = (uint8_t)(step_tail - SEGMENT_BYTES);
         if (is_silent(segment_at(offset)))
             offset = (uint8_t)(offset + SEGMENT_BYTES);
@@ -1232,11 +1209,9 @@ void engine_velocity(uint32_t *rpm, uint32_t *cycle_us)
         exact_cycle_us = 0;
     }
     *rpm = (v >> basis.factor_log2) / 100u;
+    if (exact_cycle_us == 0)
+        exact_cycle_us = (ramp_interval(&basis.ramp, v).ticks << basis.factor_log2) / TICKS_PER_US;
     *cycle_us = exact_cycle_us;
-    if (exact_cycle_us == 0) {
-        ramp_time_t interval = ramp_interval(&basis.ramp, v);
-        *cycle_us = (interval.ticks << basis.factor_log2) / TICKS_PER_US;
-    }
 }
 
 void engine_set_gap(bool on)
