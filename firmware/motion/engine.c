@@ -12,10 +12,8 @@
 #include "settings.h"
 
 #define TICKS_PER_US 16u
-#define PROFILE_CHUNK_US_LOG2 (PROFILE_CHUNK_LOG2 - 4)
-#define PROFILE_CHUNK_US (1u << PROFILE_CHUNK_US_LOG2)
-#define DIR_SETUP_TICKS 80u      /* dir before the first pulse: 5 us, the slowest common drivers ask for it */
-#define TURN_TICKS (DIR_SETUP_TICKS + 100u) /* the same where the step interrupt sets dir: its latency and cycles */
+#define DIR_SETUP_CYCLES 80u      /* dir before the first pulse: 5 us, the slowest common drivers ask for it */
+#define TURN_CYCLES (DIR_SETUP_CYCLES + 100u) /* the same where the step interrupt sets dir: its latency and cycles */
 #define TAIL_TICKS 320u          /* the end of the closing interval, on which a following command is joined */
 #define SHORTEST_PIECE_TICKS 128u
 #define RUN_MAX_PERIODS 65000u
@@ -24,13 +22,13 @@
 #define AHEAD_TICKS (AHEAD_PERIODS * AHEAD_PERIOD_TICKS)
 #define AHEAD_LONG_PERIODS 24u   /* ... and 3 ms, for a linear one and wherever possible */
 #define AHEAD_LONG_TICKS (AHEAD_LONG_PERIODS * AHEAD_PERIOD_TICKS)
-#define CUT_KEEP_TICKS 49152u    /* motion left to run while a deceleration is planned */
+#define CUT_KEEP_CYCLES 49152u    /* motion left to run while a deceleration is planned */
 #define CRUISE_GROUP_TICKS 4096u /* shortest run of a cruise whose interval has a fraction */
-#define JOIN_TICKS 18000u         /* before the tail: to plan a command and emit its first intervals */
-#define JOIN_LINEAR_TICKS 40000u  /* the same for a linear one */
-#define JOIN_FLAT_TICKS 2500u     /* and for one without ramps */
-#define JOIN_SOON_TICKS 160000u   /* before the tail: when that is done at the earliest */
-#define START_TICKS 12000u       /* in the ring before the timer runs */
+#define JOIN_CYCLES 18000u         /* before the tail: to plan a command and emit its first intervals */
+#define JOIN_LINEAR_CYCLES 40000u  /* the same for a linear one */
+#define JOIN_FLAT_CYCLES 2500u     /* and for one without ramps */
+#define JOIN_SOON_CYCLES 160000u   /* before the tail: when that is done at the earliest */
+#define START_CYCLES 12000u       /* in the ring before the timer runs */
 #define START_PERIODS 4u         /* and at least so many: a segment is loaded when the one before it begins */
 #define RING_REFILL (12u * SEGMENT_BYTES) /* free segments for a block to be gone on with */
 #define RING_RESERVE (4u * SEGMENT_BYTES) /* segments that one step of emission may need */
@@ -47,6 +45,8 @@ typedef enum {
 
 static struct {
     uint16_t width_ticks; /* of a pulse */
+    int32_t adjust_q16;   /* each interval is longer by so many ticks: xclk - ihd */
+    bool plain;           /* it is not, and a tick is a cycle */
     const motion_command_t *next; /* offered, not begun; null: nothing */
     bool endless;                 /* the command goes on until it is cut */
     bool playing; /* the timer runs (it may play silence) */
@@ -97,10 +97,23 @@ static bool is_held(const motion_command_t *c)
     return (c->flags & MOTION_SYNC) != 0;
 }
 
+/* Not more ticks than such cycles, with an external clock. */
+static NOINLINE uint16_t ticks_of_cycles(uint16_t cycles)
+{
+    return cycles >> basis.ramp.cycles_log2;
+}
+
+static NOINLINE uint32_t us_of(uint32_t chunks, uint32_t ticks)
+{
+    if (basis.ramp.cycles_log2 == 0)
+        return (chunks << (PROFILE_CHUNK_LOG2 - 4)) + ticks / TICKS_PER_US;
+    return ramp_scale((chunks << PROFILE_CHUNK_LOG2) + ticks, 1000000, basis.ramp.clock_hz);
+}
+
 /* The first pulse comes so long after the start wait: with those that are released together, a fixed time. */
 static uint16_t setup_ticks(void)
 {
-    return (uint16_t)(DIR_SETUP_TICKS + engine.width_ticks);
+    return (uint16_t)(ticks_of_cycles(DIR_SETUP_CYCLES) + engine.width_ticks);
 }
 
 static NOINLINE bool has_no_ramps(const motion_command_t *c)
@@ -123,16 +136,21 @@ static uint8_t direction_flags(const motion_command_t *c, bool turn)
 
 void engine_init(void)
 {
+    uint32_t clock_hz = settings.internal_clock ? TICKS_PER_US * 1000000u : settings.xclk_hz;
     profile_basis(&basis, settings.steps_per_rev, drivers_ustep(settings.driver_id, settings.ustep),
-                  settings.slow_rpm, settings.internal_clock ? TICKS_PER_US * 1000000u : settings.xclk_hz);
+                  settings.slow_rpm, clock_hz);
     engine.v_in_play = basis.v_slow;
     engine.in_play_cycle_us = 0;
     engine.gap_off = false;
     /* sqrt(3.217e15 / (sprf * F * accel)) ticks; with so many steps there is one at least. */
     certain_accel = (uint16_t)(basis.ramp.steps_per_rev < 200 ? 0 : (1300000u >> basis.factor_log2) / basis.ramp.steps_per_rev);
-    engine.width_ticks = (uint16_t)settings.pulse_us * TICKS_PER_US;
+    profile_interval_t width;
+    profile_interval(&basis, settings.pulse_us, 0, &width);
+    engine.width_ticks = (uint16_t)((width.ticks_q8 + 255) >> 8);
+    /* In half microseconds. */
+    engine.adjust_q16 = (int16_t)(settings.xclk_counts - settings.ihd_counts) * (int32_t)(clock_hz / 15625u * 512u);
+    engine.plain = settings.internal_clock && engine.adjust_q16 == 0;
     step_port_init();
-    step_port_clock(!settings.internal_clock);
 }
 
 /* -- the ring -------------------------------------------------------------------------------------------------- */
@@ -146,6 +164,8 @@ static NOINLINE uint8_t early_periods(const segment_t *s)
 /* The same for periods of top + 1 ticks. */
 static NOINLINE uint8_t early_of(uint16_t top)
 {
+    if (basis.ramp.cycles_log2)
+        return 0; /* no period of an external clock is so short */
     return (uint8_t)((top < SEGMENT_EARLY1_BELOW_TICKS - 1) + (top < SEGMENT_EARLY2_BELOW_TICKS - 1) +
                      (top < SEGMENT_EARLY3_BELOW_TICKS - 1));
 }
@@ -333,20 +353,21 @@ static void push(uint16_t periods, uint16_t ticks, bool pulse)
         allow_hold(pulses_to_come(0));
 }
 
-/* The interval that ends with the pulse of the segment at `offset`: its period and the silence before it. */
+/* The interval that ends with the pulse of the segment at `offset`, as it was planned: its period and the silence before
+ * it. */
 static uint32_t interval_at(uint8_t offset)
 {
     const segment_t *before = segment_at((uint8_t)(offset - SEGMENT_BYTES));
     uint32_t ticks = is_silent(before) ? ticks_of(before, counted_periods(before)) : 0;
-    return ticks + ticks_of(segment_at(offset), 1);
+    return ticks + ticks_of(segment_at(offset), 1) - (uint32_t)(engine.adjust_q16 >> 16);
 }
 
 /* Ticks from the segment at `offset`, which has so many periods left, to the one at `end`, or more than
- * JOIN_SOON_TICKS. */
+ * JOIN_SOON_CYCLES. */
 static uint32_t ticks_between(uint8_t offset, uint16_t periods, uint8_t end)
 {
     uint32_t ticks = 0;
-    while (offset != end && ticks <= JOIN_SOON_TICKS) {
+    while (offset != end && ticks <= JOIN_SOON_CYCLES) {
         ticks += ticks_of(segment_at(offset), periods);
         offset = (uint8_t)(offset + SEGMENT_BYTES);
         periods = counted_periods(segment_at(offset));
@@ -408,8 +429,10 @@ static void set_interval(int32_t ticks, bool pulse)
 
 static NOINLINE void set_silence(uint32_t us)
 {
-    engine.silence_chunks = us >> PROFILE_CHUNK_US_LOG2;
-    set_interval((uint16_t)us % PROFILE_CHUNK_US * TICKS_PER_US, false);
+    profile_interval_t silence;
+    profile_interval(&basis, us, 0, &silence);
+    engine.silence_chunks = silence.chunks;
+    set_interval((int32_t)(silence.ticks_q8 >> 8), false);
 }
 
 /* Adds the carried fraction to a time; what remains is carried on. */
@@ -497,7 +520,7 @@ static NOINLINE void begin_block(void)
 {
     block_t *b = &block;
     NEAR(b);
-    uint8_t split = b->top_q16 >> 16 >= BLOCK_SPLIT_TICKS - 1 ? BLOCK_SPLIT : 0;
+    uint8_t split = (b->top_q16 >> 16) + 1 >= basis.ramp.split_ticks ? BLOCK_SPLIT : 0;
     b->shape = speeds_up() ? split | BLOCK_FASTER : split;
     uint32_t carry = 0;
     if (engine.carry_q16 > 0) { /* otherwise it waits for a single interval */
@@ -520,26 +543,26 @@ static NOINLINE void begin_block(void)
 static uint16_t cruise_next(uint16_t run, ramp_time_t *sum)
 {
     uint32_t chunks = profile.cruise.chunks;
-    uint32_t ticks_q8 = profile.cruise.ticks_q8;
+    uint32_t ticks_q8 = profile.cruise.ticks_q8 + (uint32_t)(engine.adjust_q16 >> 8);
     ramp.rest = false;
-    if (chunks > 1) {
-        engine.silence_chunks = chunks;
-        run = 1;
-    } else if (chunks) {
+    if (chunks) {
+        engine.silence_chunks = chunks - 1;
         ticks_q8 += (uint32_t)PROFILE_CHUNK_TICKS << 8;
     }
-    uint16_t ticks = (uint16_t)(ticks_q8 >> 8);
+    uint32_t ticks = ticks_q8 >> 8;
     uint8_t frac = (uint8_t)ticks_q8;
+    if (chunks > 1 || ticks > 65535u)
+        run = 1;
     if (frac == 0 || run < 8) {
         uint32_t fraction = (uint32_t)frac * run;
-        sum->ticks = (uint32_t)ticks * run + (fraction >> 8);
+        sum->ticks = ticks * run + (fraction >> 8);
         sum->frac_q16 = (uint16_t)(fraction << 8);
         return run;
     }
     /* Runs of two neighbouring values. */
     uint8_t pulses = 8;
     run /= 8;
-    for (uint16_t least = CRUISE_GROUP_TICKS / 8; pulses < 128 && ticks < least && run > 1; least /= 2) {
+    for (uint16_t least = CRUISE_GROUP_TICKS / 8; pulses < 128 && (uint16_t)ticks < least && run > 1; least /= 2) {
         pulses = (uint8_t)(pulses * 2);
         run /= 2;
     }
@@ -554,14 +577,22 @@ static uint16_t cruise_next(uint16_t run, ramp_time_t *sum)
 /* The next intervals of the phase, as ramp_next() has them. */
 static NOINLINE uint16_t next_group(uint16_t at_most, ramp_time_t *sum)
 {
-    return engine.ramp_state == MOTION_CRUISE ? cruise_next(at_most, sum)
-                                              : ramp_next(&ramp, at_most, sum, &block);
+    if (engine.ramp_state == MOTION_CRUISE)
+        return cruise_next(at_most, sum);
+    uint16_t pulses = ramp_next(&ramp, at_most, sum, &block);
+    int32_t adjust_q16 = engine.adjust_q16;
+    if (adjust_q16) {
+        block.top_q16 += (uint32_t)adjust_q16;
+        sum->ticks += (uint32_t)(adjust_q16 >> 16) * pulses;
+        engine.carry_q16 += (int32_t)((uint32_t)(uint16_t)adjust_q16 * pulses);
+    }
+    return pulses;
 }
 
 /* The interval after the last pulse of the command, of so many ticks and the silence that is set up: body, then tail. */
 static void begin_closing(uint32_t ticks)
 {
-    engine.closing_us = (engine.silence_chunks << PROFILE_CHUNK_US_LOG2) + ticks / TICKS_PER_US;
+    engine.closing_us = us_of(engine.silence_chunks, ticks);
     uint16_t tail = TAIL_TICKS;
     if (engine.silence_chunks || ticks >= 2 * TAIL_TICKS)
         set_interval((int32_t)(ticks - TAIL_TICKS), false);
@@ -686,6 +717,7 @@ static void begin_ring(void)
 {
     if (engine.playing)
         step_port_halt();
+    step_port_clock(!settings.internal_clock);
     engine.playing = false;
     step_head = step_tail = 0;
     step_hold = 0;
@@ -748,7 +780,7 @@ static motion_state_t certain_state(void)
     bool is_cycle = c->flags & MOTION_CYCLE;
     uint16_t accel = c->accel;
     bool certain;
-    if (engine.v_in_play != basis.v_slow)
+    if (engine.v_in_play != basis.v_slow || !engine.plain)
         return MOTION_STANDBY;
     if (accel == ACCEL_NONE) { /* the cruise interval, or that of the deceleration from there */
         certain = is_cycle && velocity >> basis.factor_log2 >= AHEAD_LONG_TICKS / TICKS_PER_US + 8;
@@ -777,10 +809,10 @@ static void fill(void)
     uint32_t ticks = 0;
     uint16_t periods = 0;
     uint8_t offset = step_head;
-    while ((ticks < START_TICKS || periods < START_PERIODS ||
+    while ((ticks < ticks_of_cycles(START_CYCLES) || periods < START_PERIODS ||
             (!engine.playing && (((engine.ramp_state == MOTION_ACCEL || engine.ramp_state == MOTION_DECEL) &&
                                   (ramp.steep > 1 || ramp.group_log2 == 0)) ||
-                                 (profile.cruise_pulses == 0 && ticks < CUT_KEEP_TICKS)))) &&
+                                 (profile.cruise_pulses == 0 && ticks < ticks_of_cycles(CUT_KEEP_CYCLES))))) &&
            ring_free() >= RING_RESERVE && emit()) {
         uint16_t first = counted_periods(segment_at(offset));
         ticks += ticks_between(offset, first, step_head);
@@ -793,7 +825,7 @@ static void fill(void)
  * last for long enough. Emits them and returns how many; 0: plan first. */
 static uint16_t begin_cruise(uint8_t flags)
 {
-    if (!has_no_ramps(&command))
+    if (!has_no_ramps(&command) || !engine.plain)
         return 0;
     uint32_t cycle_us = profile_cycle_us(&basis, &command);
     if (cycle_us > UINT16_MAX / TICKS_PER_US)
@@ -801,7 +833,7 @@ static uint16_t begin_cruise(uint8_t flags)
     uint16_t full_ticks = (uint16_t)(cycle_us * TICKS_PER_US);
     uint16_t ticks = (uint16_t)(full_ticks >> basis.factor_log2);
     uint16_t run = run_of(command.count - 1); /* at least: full steps have more */
-    if ((uint16_t)(ticks << basis.factor_log2) != full_ticks || (uint32_t)run * ticks < START_TICKS)
+    if ((uint16_t)(ticks << basis.factor_log2) != full_ticks || (uint32_t)run * ticks < START_CYCLES)
         return 0;
     engine.ramp_state = MOTION_CRUISE;
     append_run(run, ticks, true, (uint8_t)(MOTION_CRUISE | flags));
@@ -822,13 +854,14 @@ static void start_next(void)
     flags &= 1 << SEGMENT_CCW_BIT;
     uint16_t cruised = 0;
     engine.stage = STAGE_LEAD;
-    if (command.start_wait_us < 3072u) {
+    bool at_once = command.start_wait_us < 3072u;
+    if (at_once && settings.internal_clock) {
         uint16_t wait = (uint16_t)(command.start_wait_us * TICKS_PER_US);
         motion_state_t state = held ? MOTION_STANDBY : certain_state();
         uint8_t lead_flags = flags;
         engine.stage = STAGE_RUN;
         flags |= (uint8_t)state;
-        uint16_t lead = DIR_SETUP_TICKS - 1;
+        uint16_t lead = DIR_SETUP_CYCLES - 1;
         if (wait >= SHORTEST_PIECE_TICKS) {
             append(1, wait - 1, SEGMENT_SILENT, lead_flags);
         } else {
@@ -851,7 +884,7 @@ static void start_next(void)
     } else {
         for (uint8_t steps = 4; steps > 0 && engine.stage == STAGE_LEAD; steps--)
             emit(); /* sets the wait up, then its silence, then the pulse */
-        if (!held)
+        if (!held && !at_once)
             play();
     }
     plan();
@@ -895,12 +928,13 @@ static void join_next(void)
             return;
         ticks = top - counter;
     }
-    uint16_t needed = JOIN_TICKS;
+    uint16_t needed = JOIN_CYCLES;
     if (has_no_ramps(next))
-        needed = JOIN_FLAT_TICKS;
+        needed = JOIN_FLAT_CYCLES;
     else if (next->flags & MOTION_LINEAR)
-        needed = JOIN_LINEAR_TICKS;
-    if (ticks > JOIN_SOON_TICKS || ticks < needed)
+        needed = JOIN_LINEAR_CYCLES;
+    ticks <<= basis.ramp.cycles_log2;
+    if (ticks > JOIN_SOON_CYCLES || ticks < needed)
         return; /* later, or after its end */
     bool turns = is_ccw(next) != is_ccw(&command);
     uint32_t wait_us = next->start_wait_us;
@@ -917,8 +951,8 @@ static void join_next(void)
         if (waits) {
             flags = tail->flags;
         } else {
-            uint16_t least = (uint16_t)(TURN_TICKS + engine.width_ticks);
-            top = (uint16_t)(top + (uint8_t)wait_us * TICKS_PER_US);
+            uint16_t least = (uint16_t)(ticks_of_cycles(TURN_CYCLES) + 1 + engine.width_ticks);
+            top = (uint16_t)(top + ticks_of_cycles((uint8_t)wait_us * TICKS_PER_US));
             if (turns && top < least)
                 top = least;
             match = (uint16_t)(top - engine.width_ticks);
@@ -946,7 +980,10 @@ static void join_next(void)
 
 status_t engine_check(const motion_command_t *c)
 {
-    return profile_check(&basis, c, settings.pulse_us);
+    uint16_t pulse_us = settings.pulse_us;
+    if (settings.ihd_counts > settings.xclk_counts) /* as if pulses were longer by what is taken away */
+        pulse_us = (uint16_t)(pulse_us + (uint8_t)(settings.ihd_counts - settings.xclk_counts + 1) / 2);
+    return profile_check(&basis, c, pulse_us);
 }
 
 void engine_offer(const motion_command_t *offered)
@@ -1061,7 +1098,7 @@ static NOINLINE uint32_t cut(void)
     uint8_t first = (uint8_t)(at.tail - SEGMENT_BYTES);
     uint8_t offset = first;
     uint16_t left = at.to_count;
-    uint16_t keep_ticks = CUT_KEEP_TICKS;
+    uint16_t keep_ticks = ticks_of_cycles(CUT_KEEP_CYCLES);
     const segment_t *s;
     for (;;) {
         s = segment_at(offset);
@@ -1180,7 +1217,9 @@ void engine_single_pulse(bool ccw)
     engine.single = true;
     command.flags = ccw ? MOTION_CCW : 0;
     uint8_t flags = direction_flags(&command, true);
-    append_run(1, (uint16_t)(TURN_TICKS + engine.width_ticks), true, flags);
+    step_port_clock(false); /* it is waited for */
+    append(1, (uint16_t)(TURN_CYCLES + settings.pulse_us * TICKS_PER_US - 1), TURN_CYCLES - 1, flags);
+    add_pulses(flags, 1);
     play();
 }
 
@@ -1210,7 +1249,7 @@ void engine_velocity(uint32_t *rpm, uint32_t *cycle_us)
     }
     *rpm = (v >> basis.factor_log2) / 100u;
     if (exact_cycle_us == 0)
-        exact_cycle_us = (ramp_interval(&basis.ramp, v).ticks << basis.factor_log2) / TICKS_PER_US;
+        exact_cycle_us = us_of(0, ramp_interval(&basis.ramp, v).ticks << basis.factor_log2);
     *cycle_us = exact_cycle_us;
 }
 

@@ -52,7 +52,7 @@ NOINLINE void profile_interval(const profile_basis_t *basis, uint32_t us, uint8_
     interval->ticks_q8 = (wide_half(&ticks_q9, 0) & 0xFFFFFFu) >> 1;
 }
 
-status_t profile_check(const profile_basis_t *basis, const motion_command_t *command, uint8_t pulse_us)
+status_t profile_check(const profile_basis_t *basis, const motion_command_t *command, uint16_t pulse_us)
 {
     if (command->velocity == 0)
         return STATUS_VELOCITY_ZERO;

@@ -62,7 +62,7 @@ uint32_t profile_rpm(const profile_basis_t *basis, const motion_command_t *comma
 uint32_t profile_cycle_us(const profile_basis_t *basis, const motion_command_t *command);
 
 /* STATUS_OK, or why the command cannot be executed with a pulse of pulse_us. */
-status_t profile_check(const profile_basis_t *basis, const motion_command_t *command, uint8_t pulse_us);
+status_t profile_check(const profile_basis_t *basis, const motion_command_t *command, uint16_t pulse_us);
 
 /* Plans a checked command that begins at velocity v_in (slow speed from standstill). */
 void profile_plan(profile_t *profile, const profile_basis_t *basis, const motion_command_t *command, uint32_t v_in);
