@@ -30,6 +30,7 @@
 #define JOIN_SOON_CYCLES 160000u   /* before the tail: when that is done at the earliest */
 #define START_CYCLES 12000u       /* in the ring before the timer runs */
 #define START_PERIODS 4u         /* and at least so many: a segment is loaded when the one before it begins */
+#define HOLD_LEAST 64u           /* pulses that may be repeated if the ring runs empty; with fewer, more are allowed */
 #define RING_REFILL (12u * SEGMENT_BYTES) /* free segments for a block to be gone on with */
 #define RING_RESERVE (4u * SEGMENT_BYTES) /* segments that one step of emission may need */
 
@@ -349,7 +350,7 @@ static void push(uint16_t periods, uint16_t ticks, bool pulse)
     }
     if (periods)
         append_run(periods, ticks, pulse, (uint8_t)(engine.ramp_state | direction_flags(&command, turn)));
-    if (pulse)
+    if (pulse && step_hold < HOLD_LEAST)
         allow_hold(pulses_to_come(0));
 }
 
@@ -510,7 +511,8 @@ static void emit_block(void)
     uint16_t made = (uint16_t)((uint8_t)(runs - block.runs) * pulses);
     take(engine.phase_left, made);
     add_pulses(block.flags, made);
-    allow_hold(pulses_to_come((uint16_t)(block.runs * pulses)));
+    if (step_hold < HOLD_LEAST)
+        allow_hold(pulses_to_come((uint16_t)(block.runs * pulses)));
     if (block.runs == 0)
         engine.carry_q16 += (int32_t)(block.shape & BLOCK_SPLIT ? block.carry_q16 : (uint32_t)block.carry_q16 * pulses);
 }
