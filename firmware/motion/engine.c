@@ -101,7 +101,7 @@ static bool is_held(const motion_command_t *c)
 /* Not more ticks than such cycles, with an external clock. */
 static NOINLINE uint16_t ticks_of_cycles(uint16_t cycles)
 {
-    return cycles >> basis.ramp.cycles_log2;
+    return (uint16_t)(cycles >> basis.ramp.cycles_log2);
 }
 
 static NOINLINE uint32_t us_of(uint32_t chunks, uint32_t ticks)
