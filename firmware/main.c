@@ -23,8 +23,6 @@ static bool saved;        /* ... and whether there is one */
 
 void boot_restart(void)
 {
-    const uint8_t ustep = drivers_ustep(settings.driver_id, settings.ustep);
-    pins_microsteps(drivers_pins(settings.driver_id, ustep, settings.driver_map));
     engine_init();
     commands_init();
     terminal_port_init(settings.hw_baud);

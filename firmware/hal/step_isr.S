@@ -180,11 +180,27 @@ near_run_out:
         rjmp    run_out
 
         /* dir belongs to the segment whose only period has just begun: the last pulse before it has fallen. */
-set_dir:
+set_dir:                                /* r24: its flags; Z: the segment after it */
         sbrc    r24, SEGMENT_DIR_BIT
         sbi     io(PORTB), 5
         sbrs    r24, SEGMENT_DIR_BIT
         cbi     io(PORTB), 5
+        subi    r30, SEGMENT_BYTES
+        ldd     r24, Z + 7
+        subi    r30, -SEGMENT_BYTES
+        sbrc    r24, SEGMENT_MS1_BIT
+        sbi     io(PORTC), 3
+        sbrs    r24, SEGMENT_MS1_BIT
+        cbi     io(PORTC), 3
+        sbrc    r24, SEGMENT_MS2_BIT
+        sbi     io(PORTC), 4
+        sbrs    r24, SEGMENT_MS2_BIT
+        cbi     io(PORTC), 4
+        sbrc    r24, SEGMENT_MS3_BIT
+        sbi     io(PORTB), 4
+        sbrs    r24, SEGMENT_MS3_BIT
+        cbi     io(PORTB), 4
+        lds     r24, step_flags
         ret
 
 stop_clock:

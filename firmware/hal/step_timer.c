@@ -93,6 +93,7 @@ static void make_ready(void)
     lead->match = SEGMENT_SILENT;
     lead->flags = 0;
     const segment_t *s = segment_at(first);
+    lead->gear = s->gear;
     timer->top = s->top;
     timer->match = s->match;
     GPIOR0 = s->count_low;

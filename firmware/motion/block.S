@@ -151,8 +151,10 @@ put:
         st      Z+, COUNT
         clr     r26
         st      Z+, r26
-        st      Z, FLAGS
-        subi    r30, -2
+        st      Z+, FLAGS
+        ldd     r26, Y + BLOCK_GEAR
+        st      Z, r26
+        inc     r30
         sts     step_head, r30
 7:      ret
 

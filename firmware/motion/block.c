@@ -14,6 +14,7 @@ CHECK(RUNS, runs);
 CHECK(PULSES, pulses);
 CHECK(FLAGS, flags);
 CHECK(SHAPE, shape);
+CHECK(GEAR, gear);
 #else
 
 static void append(const block_t *block, uint8_t periods, uint16_t top)
@@ -28,6 +29,7 @@ static void append(const block_t *block, uint8_t periods, uint16_t top)
     s->count_low = (uint8_t)(periods - early);
     s->count_high = 0;
     s->flags = (uint8_t)(block->flags | early << SEGMENT_EARLY_SHIFT);
+    s->gear = block->gear;
     step_head = (uint8_t)(step_head + SEGMENT_BYTES);
 }
 

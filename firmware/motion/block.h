@@ -31,6 +31,7 @@ typedef struct {
     uint8_t pulses;    /* of a run */
     uint8_t flags;     /* of their segments */
     uint8_t shape;     /* BLOCK_* bits */
+    uint8_t gear;      /* of their segments */
 } block_t;
 
 /* Appends runs, of one segment or two, while there are any and the ring has room for two segments. */

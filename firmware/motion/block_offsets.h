@@ -11,6 +11,7 @@
 #define BLOCK_PULSES 17
 #define BLOCK_FLAGS 18
 #define BLOCK_SHAPE 19
+#define BLOCK_GEAR 20
 
 #define BLOCK_FASTER_BIT 0
 #define BLOCK_SPLIT_BIT 1

@@ -9,6 +9,7 @@
 #include "motion/ramp.h"
 #include "motion/segment.h"
 #include "motion/step_port.h"
+#include "pins_port.h"
 #include "settings.h"
 
 #define TICKS_PER_US 16u
@@ -30,6 +31,7 @@
 #define JOIN_SOON_CYCLES 160000u   /* before the tail: when that is done at the earliest */
 #define START_CYCLES 12000u       /* in the ring before the timer runs */
 #define START_PERIODS 4u         /* and at least so many: a segment is loaded when the one before it begins */
+#define GEAR_CYCLES 1600u        /* with auto-micro: no pulses nearer than these, if larger steps can help it */
 #define HOLD_LEAST 64u           /* pulses that may be repeated if the ring runs empty; with fewer, more are allowed */
 #define RING_REFILL (12u * SEGMENT_BYTES) /* free segments for a block to be gone on with */
 #define RING_RESERVE (4u * SEGMENT_BYTES) /* segments that one step of emission may need */
@@ -46,6 +48,9 @@ typedef enum {
 
 static struct {
     uint16_t width_ticks; /* of a pulse */
+    uint8_t gear;         /* each pulse makes this power of two of the smallest steps, in which all that is planned counts */
+    uint8_t running_gear; /* when the position was last looked at */
+    uint8_t gear_bits;    /* the same, and MS1 to MS3, as segments have them */
     int32_t adjust_q16;   /* each interval is longer by so many ticks: xclk - ihd */
     bool plain;           /* it is not, and a tick is a cycle */
     const motion_command_t *next; /* offered, not begun; null: nothing */
@@ -135,6 +140,38 @@ static uint8_t direction_flags(const motion_command_t *c, bool turn)
     return flags;
 }
 
+/* -- gears ------------------------------------------------------------------------------------------------------- */
+
+static NOINLINE void set_gear(uint8_t gear)
+{
+    engine.gear = gear;
+    engine.gear_bits = (uint8_t)(drivers_pins(settings.driver_id, (uint8_t)(basis.factor_log2 - gear), settings.driver_map)
+                                     << SEGMENT_MS_SHIFT |
+                                 gear);
+}
+
+static uint8_t gear_of(const segment_t *s)
+{
+    return s->gear & SEGMENT_GEAR_MASK;
+}
+
+/* Smallest steps to the next full one. */
+static NOINLINE uint8_t to_full_step(void)
+{
+    uint8_t place = (uint8_t)engine.emitted;
+    if (!is_ccw(&command))
+        place = (uint8_t)(0u - place);
+    return place & (uint8_t)((1u << basis.factor_log2) - 1u);
+}
+
+/* In standstill at a full step: the lowest. */
+static NOINLINE void reset_gear(void)
+{
+    if (to_full_step() == 0)
+        set_gear(0);
+    pins_microsteps(engine.gear_bits >> SEGMENT_MS_SHIFT);
+}
+
 void engine_init(void)
 {
     uint32_t clock_hz = settings.internal_clock ? TICKS_PER_US * 1000000u : settings.xclk_hz;
@@ -152,6 +189,7 @@ void engine_init(void)
     engine.adjust_q16 = (int16_t)(settings.xclk_counts - settings.ihd_counts) * (int32_t)(clock_hz / 15625u * 512u);
     engine.plain = settings.internal_clock && engine.adjust_q16 == 0;
     step_port_init();
+    reset_gear();
 }
 
 /* -- the ring -------------------------------------------------------------------------------------------------- */
@@ -212,7 +250,7 @@ static NOINLINE uint8_t pulses_to_come(uint16_t planned)
     uint16_t left = pulses_left();
     if (left <= planned)
         return 0;
-    left = (uint16_t)(left - planned - 1);
+    left = (uint16_t)((uint16_t)(left - planned - 1) >> engine.gear);
     return (uint8_t)(left > 254 ? 254 : left);
 }
 
@@ -224,13 +262,13 @@ static NOINLINE int32_t signed_pulses(uint8_t flags, uint16_t pulses)
 
 static NOINLINE void add_pulses(uint8_t flags, uint16_t pulses)
 {
-    engine.emitted += signed_pulses(flags, pulses);
+    engine.emitted += signed_pulses(flags, pulses) << engine.gear;
 }
 
 /* Of a segment, so many periods. */
 static NOINLINE int32_t pulses_of(const segment_t *s, uint16_t periods)
 {
-    return is_silent(s) ? 0 : signed_pulses(s->flags, periods);
+    return is_silent(s) ? 0 : signed_pulses(s->flags, periods) << gear_of(s);
 }
 
 /* Is the one-period segment at `offset` being played, or over? (It is loaded one period before it begins, and what comes
@@ -271,14 +309,16 @@ static NOINLINE uint16_t take(uint32_t *phase, uint16_t pulses)
 static void absorb_held(void)
 {
     uint8_t lock = atomic_begin();
-    uint8_t held = step_held;
+    uint8_t pulses = step_held;
     step_held = 0;
     atomic_end(lock);
     engine.faults |= ENGINE_FAULT_STARVED;
-    add_pulses(step_flags, held);
+    const segment_t *last = segment_at((uint8_t)(step_head - SEGMENT_BYTES));
+    engine.emitted += pulses_of(last, pulses);
+    uint16_t held = (uint16_t)(pulses << gear_of(last));
     /* The cruise becomes shorter, or, where there is none, the ramps; the closing interval stays. */
     uint16_t left = pulses_left();
-    uint8_t given = left > held ? held : left ? (uint8_t)(left - 1) : 0;
+    uint16_t given = left > held ? held : left ? (uint16_t)(left - 1) : 0;
     engine.owed = (uint16_t)(engine.owed + held - given);
     take(&profile.decel_pulses, take(&profile.accel_pulses, take(&profile.cruise_pulses, given)));
 }
@@ -314,6 +354,7 @@ static NOINLINE void append(uint16_t periods, uint16_t top, uint16_t match, uint
     s->count_low = (uint8_t)periods;
     s->count_high = (uint8_t)((uint16_t)(periods - 1) >> 8);
     s->flags = flags;
+    s->gear = engine.gear_bits;
     step_head = (uint8_t)(step_head + SEGMENT_BYTES);
 }
 
@@ -344,8 +385,10 @@ static void push(uint16_t periods, uint16_t ticks, bool pulse)
     }
     settle(pulse ? pulses_to_come(0) : 0);
     if (pulse) {
-        uint16_t given = engine.owed < periods ? engine.owed : periods;
-        engine.owed = (uint16_t)(engine.owed - given);
+        uint16_t given = (uint16_t)(engine.owed >> engine.gear);
+        if (given > periods)
+            given = periods;
+        engine.owed = (uint16_t)(engine.owed - (given << engine.gear));
         periods = (uint16_t)(periods - given);
     }
     if (periods)
@@ -359,8 +402,10 @@ static void push(uint16_t periods, uint16_t ticks, bool pulse)
 static uint32_t interval_at(uint8_t offset)
 {
     const segment_t *before = segment_at((uint8_t)(offset - SEGMENT_BYTES));
+    const segment_t *s = segment_at(offset);
     uint32_t ticks = is_silent(before) ? ticks_of(before, counted_periods(before)) : 0;
-    return ticks + ticks_of(segment_at(offset), 1) - (uint32_t)(engine.adjust_q16 >> 16);
+    ticks += ticks_of(s, 1) - (uint32_t)(engine.adjust_q16 >> 16);
+    return ticks >> gear_of(counted_periods(s) == 1 ? before : s); /* that of the pulse before it */
 }
 
 /* Ticks from the segment at `offset`, which has so many periods left, to the one at `end`, or more than
@@ -405,6 +450,7 @@ int32_t engine_position(void)
     }
     if (!at.pulse_high && !at.period_over)
         to_come += pulses_of(running, 1);
+    engine.running_gear = gear_of(running);
     return engine.emitted - to_come;
 }
 
@@ -453,6 +499,23 @@ static NOINLINE void begin_phase(motion_state_t state)
         profile_begin_ramp(&profile, &basis, state == MOTION_ACCEL, &ramp);
 }
 
+/* That of the next pulse. */
+static NOINLINE void choose_phase(void)
+{
+    motion_state_t state = MOTION_ACCEL;
+    uint32_t *left = &profile.accel_pulses;
+    while (*left >> engine.gear == 0 && state != MOTION_DECEL) {
+        left[1] += *left; /* part of a pulse */
+        *left = 0;
+        left++; /* cruise, deceleration */
+        state++;
+    }
+    if (engine.endless && state == MOTION_CRUISE)
+        *left = UINT32_MAX / 2;
+    engine.phase_left = left;
+    begin_phase(state);
+}
+
 /* Does the phase have its longer intervals first? */
 static bool speeds_up(void)
 {
@@ -491,9 +554,12 @@ static void emit_flat(uint16_t pulses, uint32_t ticks)
 /* The phase's pulses that may be emitted, so many of them in one run: the last one of all has the closing interval. */
 static NOINLINE uint16_t pulses_of_phase(void)
 {
-    uint16_t most = (uint16_t)(pulses_left() - 1);
+    uint16_t pulse = (uint16_t)(1u << engine.gear);
+    uint16_t most = (uint16_t)(pulses_left() - pulse);
     uint32_t left = *engine.phase_left;
-    return left < most ? (uint16_t)left : most;
+    if (left < most)
+        most = (uint16_t)left;
+    return most & (uint16_t)(0u - pulse);
 }
 
 /* Appends what the ring has room for of the block. */
@@ -501,18 +567,18 @@ static void emit_block(void)
 {
     uint8_t pulses = block.pulses;
     uint8_t runs = block.runs;
-    uint16_t planned = (uint16_t)(runs * pulses);
+    uint16_t planned = (uint16_t)(runs * pulses << engine.gear);
     if (settle(pulses_to_come(planned))) {
         uint16_t most = pulses_of_phase();
         if (most < planned) /* held pulses have been taken from it */
-            block.runs = runs = (uint8_t)(most / pulses);
+            block.runs = runs = (uint8_t)((most >> engine.gear) / pulses);
     }
     block_append(&block);
     uint16_t made = (uint16_t)((uint8_t)(runs - block.runs) * pulses);
-    take(engine.phase_left, made);
+    take(engine.phase_left, (uint16_t)(made << engine.gear));
     add_pulses(block.flags, made);
     if (step_hold < HOLD_LEAST)
-        allow_hold(pulses_to_come((uint16_t)(block.runs * pulses)));
+        allow_hold(pulses_to_come((uint16_t)(block.runs * pulses << engine.gear)));
     if (block.runs == 0)
         engine.carry_q16 += (int32_t)(block.shape & BLOCK_SPLIT ? block.carry_q16 : (uint32_t)block.carry_q16 * pulses);
 }
@@ -539,13 +605,16 @@ static NOINLINE void begin_block(void)
     b->carry_q16 = (uint16_t)carry;
     b->width_ticks = engine.width_ticks;
     b->flags = (uint8_t)(engine.ramp_state | direction_flags(&command, false));
+    b->gear = engine.gear_bits;
 }
 
 /* Intervals of the cruise, as ramp_next() has those of a ramp: one, or as many as there are, or a block. */
 static uint16_t cruise_next(uint16_t run, ramp_time_t *sum)
 {
     uint32_t chunks = profile.cruise.chunks;
-    uint32_t ticks_q8 = profile.cruise.ticks_q8 + (uint32_t)(engine.adjust_q16 >> 8);
+    uint8_t gear = engine.gear;
+    uint32_t ticks_q8 = (profile.cruise.ticks_q8 << gear) + (uint32_t)(engine.adjust_q16 >> 8);
+    run = (uint16_t)(run >> gear);
     ramp.rest = false;
     if (chunks) {
         engine.silence_chunks = chunks - 1;
@@ -559,7 +628,7 @@ static uint16_t cruise_next(uint16_t run, ramp_time_t *sum)
         uint32_t fraction = (uint32_t)frac * run;
         sum->ticks = ticks * run + (fraction >> 8);
         sum->frac_q16 = (uint16_t)(fraction << 8);
-        return run;
+        return (uint16_t)(run << gear);
     }
     /* Runs of two neighbouring values. */
     uint8_t pulses = 8;
@@ -581,14 +650,24 @@ static NOINLINE uint16_t next_group(uint16_t at_most, ramp_time_t *sum)
 {
     if (engine.ramp_state == MOTION_CRUISE)
         return cruise_next(at_most, sum);
-    uint16_t pulses = ramp_next(&ramp, at_most, sum, &block);
+    uint8_t gear = engine.gear;
+    ramp.least_log2 = gear;
+    ramp.split_ticks = gear ? (uint8_t)0 : basis.ramp.split_ticks;
+    uint16_t steps = ramp_next(&ramp, at_most, sum, &block);
+    uint16_t pulses = (uint16_t)(steps >> gear);
+    if (pulses == 1)
+        block.runs = 0;
+    block.pulses = (uint8_t)(block.pulses >> gear);
+    block.top_q16 = ((block.top_q16 + 65536u) << gear) - 65536u;
+    block.slope_q16 <<= gear;
+    block.curve_q16 <<= gear;
     int32_t adjust_q16 = engine.adjust_q16;
     if (adjust_q16) {
         block.top_q16 += (uint32_t)adjust_q16;
         sum->ticks += (uint32_t)(adjust_q16 >> 16) * pulses;
         engine.carry_q16 += (int32_t)((uint32_t)(uint16_t)adjust_q16 * pulses);
     }
-    return pulses;
+    return steps;
 }
 
 /* The interval after the last pulse of the command, of so many ticks and the silence that is set up: body, then tail. */
@@ -605,13 +684,45 @@ static void begin_closing(uint32_t ticks)
     engine.stage = STAGE_TAIL;
 }
 
+/* The gear for the next pulse but one: so that pulses are not nearer than GEAR_CYCLES, and no part of a step is left. */
+static NOINLINE uint8_t wanted_gear(void)
+{
+    uint16_t ticks = ramp.ticks;
+    if (engine.ramp_state == MOTION_CRUISE)
+        ticks = profile.cruise.chunks ? UINT16_MAX : (uint16_t)(profile.cruise.ticks_q8 >> 8);
+    uint8_t gear = 0;
+    for (; gear < basis.factor_log2 && ticks < ticks_of_cycles(GEAR_CYCLES); gear++)
+        ticks = (uint16_t)(ticks << 1);
+    uint16_t left = (uint16_t)(pulses_left() - (1u << engine.gear));
+    if (left >> basis.factor_log2 == 0) {
+        while (left & ((1u << gear) - 1u))
+            gear--;
+    }
+    return gear;
+}
+
 /* The next intervals of the phase: pulses all alike, a block, or some of the former before a block. */
 static NOINLINE void emit_phase(void)
 {
     uint16_t at_most = pulses_of_phase();
+    uint16_t pulse = (uint16_t)(1u << engine.gear);
+    uint8_t gear = engine.gear;
     bool closing = at_most == 0;
-    if (closing || engine.ahead_ticks || engine.owed)
-        at_most = 1;
+    if (closing || engine.ahead_ticks || engine.owed >= pulse) {
+        at_most = pulse;
+    } else if (settings.auto_microstep) {
+        uint8_t wanted = wanted_gear();
+        if (wanted != gear) {
+            /* At a full step: the pulse after the next interval is the first one of it. */
+            uint16_t way = to_full_step();
+            if (way == 0) {
+                way = pulse;
+                gear = wanted;
+            }
+            if (at_most > way)
+                at_most = way;
+        }
+    }
     uint32_t ticks = 0;
     uint16_t pulses = 0;
     do {
@@ -625,10 +736,16 @@ static NOINLINE void emit_phase(void)
         pulses = (uint16_t)(pulses + group);
     } while (ramp.rest && pulses != at_most);
     take(engine.phase_left, pulses);
-    if (closing)
+    if (closing) {
         begin_closing(ticks);
-    else if (pulses)
+    } else if (pulses) {
+        pulses = (uint16_t)(pulses >> engine.gear);
+        if (gear != engine.gear) {
+            set_gear(gear);
+            engine.dir_due = true;
+        }
         emit_flat(pulses, ticks);
+    }
 }
 
 /* What comes next, but for a block, which is only begun. False if there is nothing. */
@@ -647,16 +764,7 @@ static bool emit_other(void)
     }
     stage_t stage = engine.stage;
     if (stage == STAGE_RUN) {
-        motion_state_t state = MOTION_ACCEL;
-        uint32_t *left = &profile.accel_pulses;
-        while (*left == 0 && state != MOTION_DECEL) {
-            left++; /* cruise, deceleration */
-            state++;
-        }
-        if (engine.endless && state == MOTION_CRUISE)
-            *left = UINT32_MAX / 2;
-        engine.phase_left = left;
-        begin_phase(state);
+        choose_phase();
         emit_phase();
         return true;
     }
@@ -730,6 +838,7 @@ static void begin_ring(void)
     engine.joined = 0;
     engine.single = false;
     drop_emission();
+    reset_gear();
 }
 
 static void forget_velocity(void)
@@ -843,6 +952,26 @@ static uint16_t begin_cruise(uint8_t flags)
     return run;
 }
 
+/* The start wait and the first pulse. */
+static NOINLINE void emit_lead(void)
+{
+    for (uint8_t steps = 4; steps > 0 && engine.stage == STAGE_LEAD; steps--)
+        emit(); /* sets the wait up, then its silence, then the pulse */
+}
+
+/* In standstill, before the first pulse of what has been planned. */
+static void choose_start_gear(void)
+{
+    if (to_full_step() == 0) {
+        choose_phase();
+        set_gear(wanted_gear());
+        engine.ramp_state = MOTION_STANDBY;
+    } else if (command.flags & MOTION_PULSES || command.extra_pulses) {
+        set_gear(0); /* as it was stopped within a step, so it is within a step that the ratio changes */
+    }
+    pins_microsteps(engine.gear_bits >> SEGMENT_MS_SHIFT);
+}
+
 /* Starts the next command, which is not planned yet, from standstill. */
 static void start_next(void)
 {
@@ -857,7 +986,10 @@ static void start_next(void)
     uint16_t cruised = 0;
     engine.stage = STAGE_LEAD;
     bool at_once = command.start_wait_us < 3072u;
-    if (at_once && settings.internal_clock) {
+    bool simple = settings.internal_clock && !settings.auto_microstep;
+    if (!simple) {
+        /* Planned before anything moves. */
+    } else if (at_once) {
         uint16_t wait = (uint16_t)(command.start_wait_us * TICKS_PER_US);
         motion_state_t state = held ? MOTION_STANDBY : certain_state();
         uint8_t lead_flags = flags;
@@ -884,14 +1016,18 @@ static void start_next(void)
         }
         add_pulses(flags, 1);
     } else {
-        for (uint8_t steps = 4; steps > 0 && engine.stage == STAGE_LEAD; steps--)
-            emit(); /* sets the wait up, then its silence, then the pulse */
-        if (!held && !at_once)
+        emit_lead();
+        if (!held)
             play();
     }
     plan();
     engine_on_start();
     profile.cruise_pulses -= cruised;
+    if (!simple) {
+        if (settings.auto_microstep)
+            choose_start_gear();
+        emit_lead();
+    }
     fill();
     if (held) {
         engine.playing = true;
@@ -918,6 +1054,8 @@ static void join_next(void)
         return;
     }
     const motion_command_t *next = engine.next;
+    if (engine.gear && (next->flags & MOTION_PULSES || next->extra_pulses))
+        return; /* parts of its pulses are to be made */
     if (is_held(next) || step_port_held())
         return; /* after its end; not before the running one may begin */
     uint8_t before = (uint8_t)(offset - SEGMENT_BYTES);
@@ -1078,6 +1216,7 @@ static void halt(void)
     engine.ended = engine.begun;
     engine.joined = 0;
     engine.emitted = engine_position();
+    set_gear(engine.running_gear);
     engine.playing = false;
     drop_emission();
     engine.stage = STAGE_REST;
@@ -1127,7 +1266,7 @@ static NOINLINE uint32_t cut(void)
     if (needed > left)
         needed = left;
     int32_t dropped = pulses_from((uint8_t)(offset + SEGMENT_BYTES));
-    engine.emitted -= dropped + signed_pulses(s->flags, step_port_shorten(offset, needed));
+    engine.emitted -= dropped + pulses_of(s, step_port_shorten(offset, needed));
     drop_emission();
     if ((uint8_t)(offset - first) < (uint8_t)(engine.joined_offset - first)) { /* what was joined never begins */
         engine.ended = (uint8_t)(engine.ended + engine.joined);
@@ -1137,6 +1276,7 @@ static NOINLINE uint32_t cut(void)
     if (s->flags & 1 << SEGMENT_CCW_BIT)
         flags |= MOTION_CCW;
     command.flags = flags;
+    set_gear(gear_of(s));
     return interval_ticks;
 }
 
@@ -1181,7 +1321,9 @@ static void end_command(accel_code_t decel, bool linear)
     profile_plan_decel(&profile, &basis, ramp_velocity(&basis.ramp, ticks), decel, linear);
     profile.cruise.chunks = ticks >> PROFILE_CHUNK_LOG2;
     profile.cruise.ticks_q8 = (ticks & (PROFILE_CHUNK_TICKS - 1)) << 8;
-    if (profile.decel_pulses == 0)
+    if (settings.auto_microstep) /* to a full step; the closing interval */
+        profile.cruise_pulses = ((to_full_step() + (1u << engine.gear) - 1u) & ((1u << basis.factor_log2) - 1u)) + 1u;
+    else if (profile.decel_pulses == 0)
         profile.cruise_pulses = 1; /* the closing interval */
     engine.endless = false;
     engine.ramp_state = MOTION_STANDBY;

@@ -126,7 +126,7 @@ static NOINLINE uint16_t choose_group(ramp_t *ramp, uint32_t change, uint32_t mo
     uint8_t log2 = ramp->group_log2;
     ramp->group_log2 = 0;
     if (ticks > GROUP_MAX_TICKS / 2)
-        return 1; /* often, near a standstill */
+        return (uint16_t)(1u << ramp->least_log2); /* often, near a standstill */
     if (!ramp->faster) {
         ticks = (uint16_t)(ticks + (ticks >> part_log2(ramp))); /* they grow, and the variable shrinks */
         most_change -= most_change >> 2;
@@ -136,6 +136,8 @@ static NOINLINE uint16_t choose_group(ramp_t *ramp, uint32_t change, uint32_t mo
     uint16_t most_ticks = ramp->steep > 1 ? GROUP_MAX_STEEP_TICKS : GROUP_MAX_TICKS;
     while (log2 && (ticks > most_ticks >> log2 || change > most_change >> log2))
         log2--;
+    if (log2 < ramp->least_log2)
+        log2 = ramp->least_log2;
     uint16_t pulses = (uint16_t)(1u << log2);
     ramp->group_log2 = log2;
     if (ramp->rest && left <= pulses)
@@ -306,6 +308,7 @@ NOINLINE void ramp_begin(ramp_t *ramp, const ramp_constants_t *constants, uint32
     ramp->bounded = false;
     ramp->run_pulses = 0;
     ramp->k_lacks = 0;
+    ramp->least_log2 = 0;
     ramp->cycles_log2 = constants->cycles_log2;
     ramp->split_ticks = constants->split_ticks;
     ramp->group_log2 = ramp->most_log2 = GROUP_MAX_LOG2;
@@ -401,7 +404,7 @@ static void divide(ramp_t *ramp, uint16_t pulses, block_t *group, const uint32_t
         uint16_t most = ticks < ramp->split_ticks ? RUN_SLOPE_Q8 / 4 : RUN_SLOPE_Q8;
         if (odd > 1)
             slope_q8 = (uint16_t)(slope_q8 / odd);
-        while (run > 1 && slope_q8 > most && span >= least) {
+        while (run >> ramp->least_log2 > 1 && slope_q8 > most && span >= least) {
             halvings++;
             run >>= 1;
             slope_q8 >>= 1;
@@ -472,7 +475,7 @@ uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *group
             if (fits) {
                 wide_copy(&ramp->x, &x_end);
                 ramp->v = v_end;
-            } else if (pulses > 1) {
+            } else if (pulses >> ramp->least_log2 > 1) {
                 ramp->most_log2 = (uint8_t)(ramp->group_log2 - 1);
             } else {
                 /* All that is left: equal intervals, from this one on. */

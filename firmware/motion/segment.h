@@ -22,7 +22,15 @@
 #define SEGMENT_EARLY_MASK 0x18
 #define SEGMENT_CCW_BIT 5       /* its pulses count negative */
 #define SEGMENT_DIR_BIT 6       /* level of the dir pin, taken if SET_DIR */
-#define SEGMENT_SET_DIR_BIT 7   /* set dir at the segment's beginning; such a segment has one period */
+#define SEGMENT_SET_DIR_BIT 7   /* set dir and MS1 to MS3 at the segment's beginning; such a segment has one period */
+
+/* The byte of the gear: how many of the smallest steps each of its pulses is (a power of two), and the levels of MS1 to MS3,
+ * set with dir. */
+#define SEGMENT_GEAR_MASK 0x07
+#define SEGMENT_MS_SHIFT 3
+#define SEGMENT_MS1_BIT 3
+#define SEGMENT_MS2_BIT 4
+#define SEGMENT_MS3_BIT 5
 
 #define SEGMENT_BYTES 8
 #define SEGMENT_COUNT 32
@@ -43,7 +51,7 @@ typedef struct {
     uint8_t count_low;   /* periods to count: low 1..256 (0 = 256) ... */
     uint8_t count_high;  /* ... plus 256 times this */
     uint8_t flags;       /* SEGMENT_* above */
-    uint8_t unused;      /* 8 bytes a segment: an offset wraps by itself */
+    uint8_t gear;        /* SEGMENT_GEAR_MASK and SEGMENT_MS* above */
 } segment_t;
 
 extern segment_t segments[SEGMENT_COUNT];

@@ -420,6 +420,11 @@ void step_port_init(void)
     p.counting = false;
 }
 
+void pins_microsteps(uint8_t pins)
+{
+    (void)pins;
+}
+
 void step_port_clock(bool external)
 {
     (void)external;
