@@ -109,7 +109,7 @@ static NOINLINE uint16_t ticks_of_cycles(uint16_t cycles)
     return (uint16_t)(cycles >> basis.ramp.cycles_log2);
 }
 
-static NOINLINE uint32_t us_of(uint32_t chunks, uint32_t ticks)
+static uint32_t us_of(uint32_t chunks, uint32_t ticks)
 {
     if (basis.ramp.cycles_log2 == 0)
         return (chunks << (PROFILE_CHUNK_LOG2 - 4)) + ticks / TICKS_PER_US;
@@ -490,7 +490,7 @@ static uint32_t take_carry(uint32_t ticks, uint16_t frac_q16)
     return (uint32_t)((int32_t)ticks + (carry >> 16));
 }
 
-static NOINLINE void begin_phase(motion_state_t state)
+static void begin_phase(motion_state_t state)
 {
     if (engine.ramp_state == state)
         return;
@@ -584,7 +584,7 @@ static void emit_block(void)
 }
 
 /* What the block's runs do not say: the ticks carried so far, their segments' flags. */
-static NOINLINE void begin_block(void)
+static void begin_block(void)
 {
     block_t *b = &block;
     NEAR(b);
@@ -657,13 +657,17 @@ static NOINLINE uint16_t next_group(uint16_t at_most, ramp_time_t *sum)
     uint16_t pulses = (uint16_t)(steps >> gear);
     if (pulses == 1)
         block.runs = 0;
-    block.pulses = (uint8_t)(block.pulses >> gear);
-    block.top_q16 = ((block.top_q16 + 65536u) << gear) - 65536u;
-    block.slope_q16 <<= gear;
-    block.curve_q16 <<= gear;
+    block_t *b = &block;
+    NEAR(b);
+    for (; gear; gear--) { /* from the smallest steps to pulses */
+        b->pulses >>= 1;
+        b->top_q16 = 2 * b->top_q16 + 65536u;
+        b->slope_q16 *= 2;
+        b->curve_q16 *= 2;
+    }
     int32_t adjust_q16 = engine.adjust_q16;
     if (adjust_q16) {
-        block.top_q16 += (uint32_t)adjust_q16;
+        b->top_q16 += (uint32_t)adjust_q16;
         sum->ticks += (uint32_t)(adjust_q16 >> 16) * pulses;
         engine.carry_q16 += (int32_t)((uint32_t)(uint16_t)adjust_q16 * pulses);
     }
@@ -1330,7 +1334,7 @@ static void end_command(accel_code_t decel, bool linear)
     engine.stage = STAGE_RUN;
 }
 
-NOINLINE void engine_stop_graceful(accel_code_t decel, bool linear)
+void engine_stop_graceful(accel_code_t decel, bool linear)
 {
     engine.next = 0;
     end_command(decel, linear);
