@@ -23,9 +23,9 @@ static bool saved;        /* ... and whether there is one */
 
 void boot_restart(void)
 {
+    terminal_port_init(settings.hw_baud); /* first: what is typed meanwhile is heard */
     engine_init();
     commands_init();
-    terminal_port_init(settings.hw_baud);
 }
 
 void boot_start(void)

@@ -185,6 +185,7 @@ set_dir:                                /* r24: its flags; Z: the segment after 
         sbi     io(PORTB), 5
         sbrs    r24, SEGMENT_DIR_BIT
         cbi     io(PORTB), 5
+        look_for_estop
         subi    r30, SEGMENT_BYTES
         ldd     r24, Z + 7
         subi    r30, -SEGMENT_BYTES

@@ -255,20 +255,21 @@ static NOINLINE uint8_t pulses_to_come(uint16_t planned)
 }
 
 /* Clockwise positive. */
-static NOINLINE int32_t signed_pulses(uint8_t flags, uint16_t pulses)
+static NOINLINE int32_t signed_pulses(uint8_t flags, uint16_t pulses, uint8_t gear)
 {
-    return flags & (1 << SEGMENT_CCW_BIT) ? -(int32_t)pulses : (int32_t)pulses;
+    int32_t steps = (int32_t)((uint32_t)pulses << gear);
+    return flags & (1 << SEGMENT_CCW_BIT) ? -steps : steps;
 }
 
 static NOINLINE void add_pulses(uint8_t flags, uint16_t pulses)
 {
-    engine.emitted += signed_pulses(flags, pulses) << engine.gear;
+    engine.emitted += signed_pulses(flags, pulses, engine.gear);
 }
 
 /* Of a segment, so many periods. */
 static NOINLINE int32_t pulses_of(const segment_t *s, uint16_t periods)
 {
-    return is_silent(s) ? 0 : signed_pulses(s->flags, periods) << gear_of(s);
+    return is_silent(s) ? 0 : signed_pulses(s->flags, periods, gear_of(s));
 }
 
 /* Is the one-period segment at `offset` being played, or over? (It is loaded one period before it begins, and what comes
@@ -842,7 +843,8 @@ static void begin_ring(void)
     engine.joined = 0;
     engine.single = false;
     drop_emission();
-    reset_gear();
+    if (settings.auto_microstep)
+        reset_gear();
 }
 
 static void forget_velocity(void)
