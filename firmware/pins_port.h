@@ -4,10 +4,6 @@
 #ifndef PINS_PORT_H
 #define PINS_PORT_H
 
-#include <stdint.h>
-
 void pins_init(void); /* at boot, before anything else: directions, pull-ups and idle levels */
-
-void pins_microsteps(uint8_t pins); /* MS1 (bit 0), MS2, MS3 */
 
 #endif

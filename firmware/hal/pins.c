@@ -1,5 +1,6 @@
 /* Directions, pull-ups and idle levels of all posts, from the table in board.h. */
 #include "board.h"
+#include "motion/step_port.h"
 #include "pins_port.h"
 #include "queue/ops_port.h"
 #include <avr/io.h>
@@ -40,7 +41,7 @@ void pins_init(void)
 }
 
 /* A one written to PINx toggles its bit of PORTx (datasheet 14.2.2): no other pin is touched, whatever interrupts do. */
-void pins_microsteps(uint8_t pins)
+void step_port_microsteps(uint8_t pins)
 {
     const uint8_t ms3 = (uint8_t)(pins << 2);
     const uint8_t ms1_ms2 = (uint8_t)(ms3 << 1);

@@ -9,7 +9,6 @@
 #include "motion/ramp.h"
 #include "motion/segment.h"
 #include "motion/step_port.h"
-#include "pins_port.h"
 #include "settings.h"
 
 #define TICKS_PER_US 16u
@@ -169,7 +168,7 @@ static NOINLINE void reset_gear(void)
 {
     if (to_full_step() == 0)
         set_gear(0);
-    pins_microsteps(engine.gear_bits >> SEGMENT_MS_SHIFT);
+    step_port_microsteps(engine.gear_bits >> SEGMENT_MS_SHIFT);
 }
 
 void engine_init(void)
@@ -975,7 +974,7 @@ static void choose_start_gear(void)
     } else if (command.flags & MOTION_PULSES || command.extra_pulses) {
         set_gear(0); /* as it was stopped within a step, so it is within a step that the ratio changes */
     }
-    pins_microsteps(engine.gear_bits >> SEGMENT_MS_SHIFT);
+    step_port_microsteps(engine.gear_bits >> SEGMENT_MS_SHIFT);
 }
 
 /* Starts the next command, which is not planned yet, from standstill. */

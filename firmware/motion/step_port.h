@@ -17,6 +17,9 @@ void step_port_clock(bool external);
 /* Level of the dir pin, at once. Only in standstill. */
 void step_port_dir(bool level);
 
+/* Levels of MS1 (bit 0), MS2, MS3, at once. Only in standstill. */
+void step_port_microsteps(uint8_t pins);
+
 /* Begins to play the ring, which holds at least one segment, after a short silent lead of STEP_PORT_LEAD_TICKS. */
 void step_port_start(void);
 #define STEP_PORT_LEAD_TICKS 16u

@@ -420,7 +420,7 @@ void step_port_init(void)
     p.counting = false;
 }
 
-void pins_microsteps(uint8_t pins)
+void step_port_microsteps(uint8_t pins)
 {
     (void)pins;
 }
