@@ -43,8 +43,9 @@ NOINLINE void profile_interval(const profile_basis_t *basis, uint32_t us, uint8_
         interval->ticks_q8 = ((us & (((uint32_t)1 << chunk_us_log2) - 1)) << 12) >> halvings;
         return;
     }
-    wide_t ticks_q9 = us;
-    ramp_multiply(&ticks_q9, basis->ramp.clock_hz);
+    wide_t ticks_q9;
+    wide_set(&ticks_q9, us);
+    wide_multiply(&ticks_q9, basis->ramp.clock_hz);
     wide_shift(&ticks_q9, -8);
     wide_divide(&ticks_q9, 1000000);
     wide_shift(&ticks_q9, (int8_t)(halvings - 1));
@@ -80,7 +81,7 @@ status_t profile_check(const profile_basis_t *basis, const motion_command_t *com
 static void linear_steps(wide_t *steps, const profile_basis_t *basis, uint32_t v, uint32_t centi)
 {
     ramp_square(steps, v >> basis->factor_log2);
-    ramp_multiply(steps, basis->ramp.steps_per_rev * (uint32_t)9);
+    wide_multiply(steps, basis->ramp.steps_per_rev * (uint32_t)9);
     wide_divide(steps, 1031324);
     wide_divide(steps, centi);
 }
@@ -90,12 +91,12 @@ static void ramp_steps(wide_t *steps, const profile_basis_t *basis, const profil
                        uint32_t centi)
 {
     uint32_t v_to = profile->v_peak;
-    *steps = 0;
+    wide_set(steps, 0);
     /* Within the slow range there are no ramps (manual lines 159, 169). */
     if (v_to <= basis->v_slow || centi == NO_RAMP_CENTI)
         return;
     if (!profile->linear) {
-        *steps = ((v_to > v_from ? v_to - v_from : v_from - v_to) >> basis->factor_log2) / centi;
+        wide_set(steps, ((v_to > v_from ? v_to - v_from : v_from - v_to) >> basis->factor_log2) / centi);
         return;
     }
     linear_steps(steps, basis, v_to, centi);
@@ -123,9 +124,10 @@ uint32_t profile_ramp_steps(const profile_basis_t *basis, uint32_t v_from, uint3
  * sprf each. */
 static void add_change(wide_t *v2, const profile_basis_t *basis, uint32_t pulses, uint32_t centi, bool add)
 {
-    wide_t change = pulses;
-    ramp_multiply(&change, centi << basis->factor_log2);
-    ramp_multiply(&change, 916732); /* 8 * 114591.559 to 5 parts in 10^7 */
+    wide_t change;
+    wide_set(&change, pulses);
+    wide_multiply(&change, centi << basis->factor_log2);
+    wide_multiply(&change, 916732); /* 8 * 114591.559 to 5 parts in 10^7 */
     wide_divide(&change, basis->ramp.steps_per_rev);
     wide_shift(&change, 3);
     if (add)
@@ -157,7 +159,8 @@ static void limit_peak(profile_t *profile, const profile_basis_t *basis)
     if (pulses == 0) {
         profile->v_peak = v_peak;
     } else if (profile->linear) {
-        wide_t v2 = 0;
+        wide_t v2;
+        wide_set(&v2, 0);
         if (v_peak != basis->v_slow || !faster)
             ramp_square(&v2, v_peak);
         add_change(&v2, basis, pulses, profile->accel_centi, faster);
@@ -326,7 +329,7 @@ void profile_begin_ramp(const profile_t *profile, const profile_basis_t *basis, 
         wide_t *bound_q16 = &ramp->limit.bound_q16;
         if (accel) {
             /* Whole full steps may pass the target a little: not beyond the interval of the cruise. */
-            *bound_q16 = (profile->cruise.chunks << (PROFILE_CHUNK_LOG2 + 8)) + profile->cruise.ticks_q8;
+            wide_set(bound_q16, (profile->cruise.chunks << (PROFILE_CHUNK_LOG2 + 8)) + profile->cruise.ticks_q8);
             wide_shift(bound_q16, -8);
             if (profile->faster && v_most == basis->v_slow)
                 ramp->v = 0; /* (decisions 0.2.4) */

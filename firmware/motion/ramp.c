@@ -29,8 +29,8 @@ void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev, uint32_
 {
     constants->steps_per_rev = steps_per_rev;
     constants->clock_hz = clock_hz;
-    constants->k2_q16 = clock_hz;
-    ramp_multiply(&constants->k2_q16, 6000u * 131072u);
+    wide_set(&constants->k2_q16, clock_hz);
+    wide_multiply(&constants->k2_q16, 6000u * 131072u);
     wide_divide(&constants->k2_q16, steps_per_rev);
     uint8_t log2 = 0;
     for (uint8_t mhz_q4 = (uint8_t)(clock_hz >> 16); mhz_q4 < 128; mhz_q4 = (uint8_t)(mhz_q4 << 1))
@@ -39,18 +39,11 @@ void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev, uint32_
     constants->split_ticks = log2 ? 0 : BLOCK_SPLIT_TICKS;
 }
 
-void ramp_multiply(wide_t *x, uint32_t factor)
-{
-    wide_t wide_factor = factor;
-    wide_t product;
-    wide_multiply(&product, &wide_factor, x); /* the shorter one first: faster */
-    wide_copy(x, &product);
-}
-
 uint32_t ramp_scale(uint32_t a, uint32_t b, uint32_t divisor)
 {
-    wide_t product = a;
-    ramp_multiply(&product, b);
+    wide_t product;
+    wide_set(&product, a);
+    wide_multiply(&product, b);
     wide_divide(&product, divisor);
     return (uint32_t)product;
 }
@@ -218,8 +211,8 @@ static NOINLINE void divide_scaled(wide_t *x, uint32_t divisor, int8_t up)
 
 void ramp_square(wide_t *x, uint32_t v)
 {
-    wide_t wide_v = v;
-    wide_multiply(x, &wide_v, &wide_v);
+    wide_set(x, v);
+    wide_multiply(x, v);
 }
 
 /* Linear: velocity units so many times twice as large, or half as large (below 0). K gets what it has room for. */
@@ -268,8 +261,8 @@ static void begin_linear(ramp_t *ramp, const ramp_constants_t *constants, uint32
     }
     scale_k(ramp, (int8_t)-scale);
     if (ramp->step) {
-        *c = ramp->step;
-        ramp_multiply(c, LINEAR_SQUARE_Q15);
+        wide_set(c, ramp->step);
+        wide_multiply(c, LINEAR_SQUARE_Q15);
         divide_scaled(c, constants->steps_per_rev, (int8_t)(2 * scale - 15));
     } else {
         ramp_square(c, v_most);
@@ -284,8 +277,8 @@ static void begin_linear(ramp_t *ramp, const ramp_constants_t *constants, uint32
     ramp->steep = (uint8_t)((steep != 0) + (steep >> 6 != 0));
     ramp_square(x, ramp->v);
     if (ramp->v == 0 && !ramp->faster) {
-        wide_t n = pulses;
-        wide_multiply(x, &n, c); /* exactly to a standstill */
+        wide_copy(x, c);
+        wide_multiply(x, pulses); /* exactly to a standstill */
         ramp->v = wide_root(x);
     }
     choose_units(ramp);
@@ -365,7 +358,7 @@ static uint16_t linear_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16, u
         choose_group(ramp, wide_half(&ramp->c, 1), wide_half(&ramp->x, 1) >> (part_log2(ramp) - 1), left);
     wide_t change;
     wide_copy(&change, &ramp->c);
-    ramp_multiply(&change, pulses);
+    wide_multiply(&change, pulses);
     wide_copy(x_end, &ramp->x);
     if (ramp->faster)
         wide_add(x_end, &change);
