@@ -1,6 +1,5 @@
-/* See wide.h. Cycles with call and return: add, subtract 96; multiply 300; set 25;
- * divide about 140 per byte of the quotient; root 1,200; shift 60
- * per whole byte and 75 per bit; copy 80; fraction 80. Little-endian, arguments by the avr-gcc calling convention. */
+/* See wide.h. Cycles with call and return: add, subtract 96; multiply 300; set 25; divide about 140 per byte of the quotient;
+ * root 1,200; shift 50 and 11 a bit; copy 80; fraction 80. Little-endian, arguments by the avr-gcc calling convention. */
 
         .section .text.wide_copy, "ax", @progbits
         .global wide_copy
@@ -235,50 +234,48 @@ wide_root:                      /* r24 x; returns r22-r25 */
         .global wide_shift
         .type wide_shift, @function
 wide_shift:                     /* r24 x, r22 bits */
-1:      movw    r30, r24
-        ldi     r18, 7
         tst     r22
-        breq    7f
-        brmi    4f
-        cpi     r22, 8
-        brlo    2f
-        subi    r22, 8
-3:      ldd     r19, Z + 1      /* a whole byte */
-        st      Z+, r19
-        dec     r18
-        brne    3b
-        st      Z, r1
-        rjmp    1b
-2:      dec     r22
-        adiw    r30, 8
-        inc     r18
-        clc
-2:      ld      r19, -Z
+        breq    5f
+        movw    r30, r24
+        ld      r18, Z
+        ldd     r19, Z + 1
+        ldd     r20, Z + 2
+        ldd     r21, Z + 3
+        ldd     r24, Z + 4
+        ldd     r25, Z + 5
+        ldd     r26, Z + 6
+        ldd     r27, Z + 7
+        brmi    3f
+2:      lsr     r27
+        ror     r26
+        ror     r25
+        ror     r24
+        ror     r21
+        ror     r20
         ror     r19
-        st      Z, r19
-        dec     r18
+        ror     r18
+        dec     r22
         brne    2b
-        rjmp    1b
-4:      cpi     r22, -7
-        brge    6f
-        subi    r22, -8
-        adiw    r30, 7
-5:      ld      r19, -Z
-        std     Z + 1, r19
-        dec     r18
-        brne    5b
-        st      Z, r1
-        rjmp    1b
-6:      inc     r22
-        inc     r18
-        clc
-6:      ld      r19, Z
+        rjmp    4f
+3:      lsl     r18
         rol     r19
-        st      Z+, r19
-        dec     r18
-        brne    6b
-        rjmp    1b
-7:      ret
+        rol     r20
+        rol     r21
+        rol     r24
+        rol     r25
+        rol     r26
+        rol     r27
+        inc     r22
+        brne    3b
+4:      st      Z, r18
+        std     Z + 1, r19
+        std     Z + 2, r20
+        std     Z + 3, r21
+        std     Z + 4, r24
+        std     Z + 5, r25
+        std     Z + 6, r26
+        std     Z + 7, r27
+5:      ret
 
         .section .text.wide_bits, "ax", @progbits
         .global wide_bits

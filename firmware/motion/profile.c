@@ -37,17 +37,15 @@ uint32_t profile_cycle_us(const profile_basis_t *basis, const motion_command_t *
 NOINLINE void profile_interval(const profile_basis_t *basis, uint32_t us, uint8_t halvings, profile_interval_t *interval)
 {
     NEAR(interval);
-    if (basis->ramp.cycles_log2 == 0) { /* 16 ticks a microsecond */
-        uint8_t chunk_us_log2 = (uint8_t)(PROFILE_CHUNK_LOG2 - 4 + halvings);
-        interval->chunks = us >> chunk_us_log2;
-        interval->ticks_q8 = ((us & (((uint32_t)1 << chunk_us_log2) - 1)) << 12) >> halvings;
-        return;
-    }
     wide_t ticks_q9;
     wide_set(&ticks_q9, us);
-    wide_multiply(&ticks_q9, basis->ramp.clock_hz);
-    wide_shift(&ticks_q9, -8);
-    wide_divide(&ticks_q9, 1000000);
+    if (basis->ramp.cycles_log2 == 0) { /* 16 ticks a microsecond */
+        halvings = (uint8_t)(halvings - 12);
+    } else {
+        wide_multiply(&ticks_q9, basis->ramp.clock_hz);
+        wide_shift(&ticks_q9, -8);
+        wide_divide(&ticks_q9, 1000000);
+    }
     wide_shift(&ticks_q9, (int8_t)(halvings - 1));
     interval->chunks = (uint32_t)wide_from_byte(&ticks_q9, 3);
     interval->ticks_q8 = (wide_half(&ticks_q9, 0) & 0xFFFFFFu) >> 1;
@@ -145,7 +143,9 @@ static NOINLINE uint32_t limited(const profile_t *profile, uint32_t v)
 {
     NEAR(profile);
     uint32_t most = profile->v_peak;
-    return (v > most) == profile->faster ? most : v;
+    if (profile->faster ? v > most : v < most)
+        return most;
+    return v;
 }
 
 /* The velocity that the acceleration reaches instead of v_peak, and that of its last interval: v_exit. */
@@ -206,34 +206,37 @@ static NOINLINE void begin_plan(profile_t *profile, accel_code_t decel, bool lin
 }
 
 /* Splits the count, in full steps or pulses, into phases. True if the ramps had to be truncated. */
-static bool split(profile_t *profile, wide_t *wide_accel, wide_t *wide_decel, uint32_t total)
+static bool split(profile_t *profile, wide_t *accel, wide_t *decel, uint32_t total)
 {
     bool truncated = false;
-    uint32_t accel;
-    uint32_t decel;
-    uint32_t whole;
+    wide_t ramps;
     for (;;) {
-        accel = wide_half(wide_accel, 0);
-        decel = wide_half(wide_decel, 0);
-        whole = accel + decel;
-        if (wide_bits(wide_accel) <= 32 && wide_bits(wide_decel) <= 32 && whole >= accel)
+        wide_copy(&ramps, accel);
+        wide_add(&ramps, decel);
+        if (wide_half(&ramps, 1) == 0)
             break;
         /* Ramps beyond any command keep their ratio. */
-        wide_shift(wide_accel, 1);
-        wide_shift(wide_decel, 1);
+        wide_shift(accel, 1);
+        wide_shift(decel, 1);
         truncated = true;
     }
+    uint32_t whole = wide_half(&ramps, 0);
     if (whole > total)
         truncated = true;
+    uint32_t decel_pulses = wide_half(decel, 0);
     if (truncated) {
-        decel = ramp_scale(decel, total, whole);
-        if (decel > 1)
-            decel = total - ramp_scale(accel, total, whole);
+        wide_multiply(decel, total);
+        wide_divide(decel, whole);
+        decel_pulses = wide_half(decel, 0);
+        if (decel_pulses > 1) {
+            wide_multiply(accel, total);
+            wide_divide(accel, whole);
+            decel_pulses = total - wide_half(accel, 0);
+        }
         whole = total;
-        accel = total - decel;
     }
-    profile->accel_pulses = accel;
-    profile->decel_pulses = decel;
+    profile->accel_pulses = whole - decel_pulses;
+    profile->decel_pulses = decel_pulses;
     profile->cruise_pulses = total - whole;
     return truncated;
 }

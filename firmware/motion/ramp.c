@@ -39,15 +39,6 @@ void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev, uint32_
     constants->split_ticks = log2 ? 0 : BLOCK_SPLIT_TICKS;
 }
 
-uint32_t ramp_scale(uint32_t a, uint32_t b, uint32_t divisor)
-{
-    wide_t product;
-    wide_set(&product, a);
-    wide_multiply(&product, b);
-    wide_divide(&product, divisor);
-    return (uint32_t)product;
-}
-
 static NOINLINE void divide_k(wide_t *quotient, const wide_t *k2_q16, uint32_t divisor)
 {
     wide_copy(quotient, k2_q16);

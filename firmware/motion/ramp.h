@@ -77,9 +77,6 @@ void ramp_begin(ramp_t *ramp, const ramp_constants_t *constants, uint32_t v_most
 /* x = v^2 */
 void ramp_square(wide_t *x, uint32_t v);
 
-/* a * b / divisor, truncated, where that fits 32 bits. divisor >= 1. */
-uint32_t ramp_scale(uint32_t a, uint32_t b, uint32_t divisor);
-
 /* The next group of at most `left` pulses (>= 1): returns how many, up to 512, and the sum of their intervals; that of
  * several is below 65,536 ticks. How these follow each other: `block`, of which runs, pulses, top, slope and curve are set;
  * no runs: alike. */
