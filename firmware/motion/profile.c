@@ -139,13 +139,12 @@ static NOINLINE uint32_t root(const wide_t *x)
     return wide_is_negative(x) ? 0 : wide_root(x);
 }
 
-static NOINLINE uint32_t limited(const profile_t *profile, uint32_t v)
+static NOINLINE uint32_t limited(uint32_t v, const profile_t *profile)
 {
     NEAR(profile);
     uint32_t most = profile->v_peak;
-    if (profile->faster ? v > most : v < most)
-        return most;
-    return v;
+    bool beyond = v > most;
+    return beyond == profile->faster ? most : v;
 }
 
 /* The velocity that the acceleration reaches instead of v_peak, and that of its last interval: v_exit. */
@@ -172,8 +171,8 @@ static void limit_peak(profile_t *profile, const profile_basis_t *basis)
         v_peak += step * pulses;
         v_last = v_peak - step;
     }
-    profile->v_exit = limited(profile, v_last);
-    profile->v_peak = limited(profile, v_peak);
+    profile->v_exit = limited(v_last, profile);
+    profile->v_peak = limited(v_peak, profile);
 }
 
 /* Would the deceleration's pulses leave the velocity above slow speed? */

@@ -244,28 +244,30 @@ static void begin_linear(ramp_t *ramp, const ramp_constants_t *constants, uint32
     NEAR(ramp);
     wide_t *c = &ramp->c;
     wide_t *x = &ramp->x;
-    uint8_t scale = 0;
-    while (v_most >> 29 == 0) {
-        v_most <<= 1;
-        ramp->v <<= 1;
-        scale++;
-    }
+    wide_set(x, v_most);
+    uint8_t scale = (uint8_t)(30 - wide_bits(x));
     scale_k(ramp, (int8_t)-scale);
+    ramp->v <<= scale;
+    uint8_t scale2 = (uint8_t)(2 * scale);
+    uint32_t divisor = pulses;
+    int8_t up = (int8_t)scale2;
     if (ramp->step) {
         wide_set(c, ramp->step);
         wide_multiply(c, LINEAR_SQUARE_Q15);
-        divide_scaled(c, constants->steps_per_rev, (int8_t)(2 * scale - 15));
+        divisor = constants->steps_per_rev;
+        up = (int8_t)(scale2 - 15);
     } else {
         ramp_square(c, v_most);
-        wide_divide(c, pulses);
     }
+    divide_scaled(c, divisor, up);
     wide_t rate;
     wide_copy(&rate, c);
-    divide_scaled(&rate, k_by_128, (int8_t)(LINEAR_RATE_LOG2 - 14u - 2u * scale));
+    divide_scaled(&rate, k_by_128, (int8_t)(LINEAR_RATE_LOG2 - 14u - scale2));
     wide_divide(&rate, k_by_128);
     ramp->rate = wide_half(&rate, 0);
-    uint32_t steep = ramp->rate >> (LINEAR_STEEP_LOG2 - 6u + 2u * ramp->cycles_log2);
-    ramp->steep = (uint8_t)((steep != 0) + (steep >> 6 != 0));
+    uint8_t bits = wide_bits(&rate);
+    uint8_t most_bits = (uint8_t)(LINEAR_STEEP_LOG2 - 6u + 2u * ramp->cycles_log2);
+    ramp->steep = (uint8_t)((bits > most_bits) + (bits > most_bits + 6));
     ramp_square(x, ramp->v);
     if (ramp->v == 0 && !ramp->faster) {
         wide_copy(x, c);
