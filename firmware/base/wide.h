@@ -91,6 +91,12 @@ static inline uint32_t wide_half(const wide_t *x, uint8_t half)
     return bits;
 }
 
+/* The upper 32 bits of x. */
+static inline void wide_set_upper(wide_t *x, uint32_t bits)
+{
+    __builtin_memcpy((uint8_t *)x + 4, &bits, sizeof bits);
+}
+
 static inline bool wide_is_negative(const wide_t *x)
 {
     return ((const uint8_t *)x)[7] >= 0x80;

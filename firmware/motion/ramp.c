@@ -77,14 +77,6 @@ static NOINLINE void set_ticks(ramp_t *ramp, const wide_t *q16)
 
 /* -- groups ------------------------------------------------------------------------------------------------------ */
 
-/* 2^32 * part / whole. The result is below 2^32. */
-static uint32_t ratio_q32(uint32_t part, uint32_t whole)
-{
-    wide_t quotient = (wide_t)part << 32;
-    wide_divide(&quotient, whole);
-    return wide_half(&quotient, 0);
-}
-
 /* By what part of its value, a power of two, the law's variable may change in a group. The parabola is off by no more than
  * 1/32 of the cube of that, of the interval: a 16,000th, or at less than 128 ticks a 2,000th. Steep ramps need groups that
  * last as long as it takes to plan them. */
@@ -260,12 +252,11 @@ static void begin_linear(ramp_t *ramp, const ramp_constants_t *constants, uint32
         ramp_square(c, v_most);
     }
     divide_scaled(c, divisor, up);
-    wide_t rate;
-    wide_copy(&rate, c);
-    divide_scaled(&rate, k_by_128, (int8_t)(LINEAR_RATE_LOG2 - 14u - scale2));
-    wide_divide(&rate, k_by_128);
-    ramp->rate = wide_half(&rate, 0);
-    uint8_t bits = wide_bits(&rate);
+    wide_copy(x, c);
+    divide_scaled(x, k_by_128, (int8_t)(LINEAR_RATE_LOG2 - 14u - scale2));
+    wide_divide(x, k_by_128);
+    ramp->rate = wide_half(x, 0);
+    uint8_t bits = wide_bits(x);
     uint8_t most_bits = (uint8_t)(LINEAR_STEEP_LOG2 - 6u + 2u * ramp->cycles_log2);
     ramp->steep = (uint8_t)((bits > most_bits) + (bits > most_bits + 6));
     ramp_square(x, ramp->v);
@@ -286,6 +277,13 @@ static NOINLINE void set_interval(ramp_t *ramp, wide_t *interval_q16, uint32_t v
     set_ticks(ramp, interval_q16);
 }
 
+/* Before the first group. */
+static NOINLINE void set_first_ticks(ramp_t *ramp, uint32_t v2)
+{
+    wide_t interval_q16;
+    set_interval(ramp, &interval_q16, v2);
+}
+
 NOINLINE void ramp_begin(ramp_t *ramp, const ramp_constants_t *constants, uint32_t v_most, uint32_t pulses)
 {
     ramp->rest = false;
@@ -300,16 +298,21 @@ NOINLINE void ramp_begin(ramp_t *ramp, const ramp_constants_t *constants, uint32
     uint32_t first2;
     if (ramp->linear) {
         begin_linear(ramp, constants, k_by_128, v_most, pulses);
-        first2 = ramp->v ? 2 * ramp->v : wide_root(&ramp->c);
+        first2 = 2 * ramp->v;
+        if (first2 == 0)
+            first2 = wide_root(&ramp->c);
     } else {
         uint32_t step = ramp->step;
-        uint32_t steep = (k_by_128 << ramp->cycles_log2) >> 10; /* K / 2^17; a third: 2^18.6 */
+        uint32_t steep = k_by_128 >> (10u - ramp->cycles_log2); /* K / 2^17; a third: 2^18.6 */
         ramp->steep = (uint8_t)((step > steep) + (3 * step > steep));
-        ramp->rate = step < k_by_128 >> 1 ? ratio_q32(2 * step, k_by_128) : UINT32_MAX;
+        wide_t *rate = &ramp->x;
+        wide_set(rate, 0);
+        wide_set_upper(rate, 2 * step);
+        wide_divide(rate, k_by_128);
+        ramp->rate = wide_half(rate, 1) ? UINT32_MAX : wide_half(rate, 0);
         first2 = 2 * (ramp->v < ramp->limit.cap ? ramp->v : ramp->limit.cap);
     }
-    wide_t interval_q16;
-    set_interval(ramp, &interval_q16, first2);
+    set_first_ticks(ramp, first2);
 }
 
 /* The next group of a law: its pulses, and the interval at the mean of the velocities at both ends. */
@@ -402,7 +405,7 @@ static void divide(ramp_t *ramp, uint16_t pulses, block_t *group, const uint32_t
     uint8_t cubic_q8 = odd == 2 ? 16 : odd == 4 ? 36 : 48;
     slope += wide_fraction(powers_q16[THIRD], (uint32_t)cubic_q8 << 24);
     if (runs > 1) {
-        uint32_t part = ratio_q32(1, runs);
+        uint32_t part = UINT32_MAX / runs; /* as good as 2^32 / runs */
         slope = wide_fraction(slope, part);
         curve = wide_fraction(wide_fraction(curve, part), part);
     }
