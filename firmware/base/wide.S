@@ -61,6 +61,15 @@ wide_subtract:
         brne    1b
         ret
 
+        .section .text.wide_change, "ax", @progbits
+        .global wide_change
+        .type wide_change, @function
+wide_change:                    /* r24 x, r22 change, r20 add */
+        tst     r20
+        brne    1f
+        jmp     wide_subtract
+1:      jmp     wide_add
+
 /* \a... += x * y, the carry as far as there are registers. r16 is zero. */
 .macro add_product x, y, a, b, c, d, e
         mul     \x, \y

@@ -15,6 +15,7 @@ void wide_set(wide_t *x, uint32_t value);
 void wide_copy(wide_t *to, const wide_t *from);
 void wide_add(wide_t *sum, const wide_t *x);           /* sum += x */
 void wide_subtract(wide_t *difference, const wide_t *x); /* difference -= x */
+void wide_change(wide_t *x, const wide_t *change, bool add); /* x += change or x -= change */
 void wide_multiply(wide_t *x, uint32_t factor);    /* x *= factor */
 uint32_t wide_divide(wide_t *x, uint32_t divisor); /* x /= divisor, truncated; returns the remainder. divisor >= 1 */
 uint32_t wide_root(const wide_t *x);               /* sqrt(x), truncated */
@@ -37,6 +38,10 @@ static inline void wide_add(wide_t *sum, const wide_t *x)
 static inline void wide_subtract(wide_t *difference, const wide_t *x)
 {
     *difference -= *x;
+}
+static inline void wide_change(wide_t *x, const wide_t *change, bool add)
+{
+    *x = add ? *x + *change : *x - *change;
 }
 static inline void wide_multiply(wide_t *x, uint32_t factor)
 {

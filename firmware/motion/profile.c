@@ -128,10 +128,7 @@ static void add_change(wide_t *v2, const profile_basis_t *basis, uint32_t pulses
     wide_multiply(&change, 916732); /* 8 * 114591.559 to 5 parts in 10^7 */
     wide_divide(&change, basis->ramp.steps_per_rev);
     wide_shift(&change, 3);
-    if (add)
-        wide_add(v2, &change);
-    else
-        wide_subtract(v2, &change);
+    wide_change(v2, &change, add);
 }
 
 static NOINLINE uint32_t root(const wide_t *x)

@@ -85,9 +85,10 @@ static NOINLINE uint8_t part_log2(const ramp_t *ramp)
     return ramp->steep > 1 ? 1 : ramp->ticks < 128 ? 2 : 3;
 }
 
-/* How many pulses the next group has: a power of two whose change, of so much a pulse, and duration are within the limits;
- * where fewer are left, so many whole runs as before. Down from twice the last group's size, which is nearly always enough. */
-static NOINLINE uint16_t choose_group(ramp_t *ramp, uint32_t change, uint32_t most_change, uint16_t left)
+/* How many pulses the next group has: a power of two whose change of the law's variable, of so much a pulse, and duration
+ * are within the limits; where fewer are left, so many whole runs as before. Down from twice the last group's size, which is
+ * nearly always enough. */
+static NOINLINE uint16_t choose_group(ramp_t *ramp, uint16_t left)
 {
     NEAR(ramp);
     uint16_t ticks = ramp->ticks;
@@ -103,8 +104,18 @@ static NOINLINE uint16_t choose_group(ramp_t *ramp, uint32_t change, uint32_t mo
     ramp->group_log2 = 0;
     if (ticks > GROUP_MAX_TICKS / 2)
         return 1; /* often, near a standstill */
+    uint32_t change = ramp->step;
+    uint32_t most_change = ramp->v;
+    if (ramp->linear) {
+        change = wide_half(&ramp->c, 1);
+        most_change = 2 * wide_half(&ramp->x, 1);
+    }
+    if (ramp->bounded)
+        change = 0;
+    uint8_t part = part_log2(ramp);
+    most_change >>= part;
     if (!ramp->faster) {
-        ticks = (uint16_t)(ticks + (ticks >> part_log2(ramp))); /* they grow, and the variable shrinks */
+        ticks = (uint16_t)(ticks + (ticks >> part)); /* they grow, and the variable shrinks */
         most_change -= most_change >> 2;
     }
     if (++log2 > ramp->most_log2)
@@ -319,49 +330,38 @@ NOINLINE void ramp_begin(ramp_t *ramp, const ramp_constants_t *constants, uint32
 
 static uint16_t harmonic_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16)
 {
-    uint32_t v2 = 2 * ramp->v;
+    uint32_t v = ramp->v;
     uint32_t step = ramp->step;
-    uint32_t cap2 = 2 * ramp->limit.cap;
-    uint16_t pulses;
-    ramp->bounded = v2 > cap2;
+    uint32_t cap = ramp->limit.cap;
+    ramp->bounded = v > cap;
     if (ramp->bounded) {
-        uint32_t above = (ramp->v - ramp->limit.cap) / step + 1; /* so many pulses */
+        uint32_t above = (v - cap) / step + 1; /* so many pulses */
         if (above < left)
             left = (uint16_t)above;
-        pulses = choose_group(ramp, 0, 0, left);
-        v2 = cap2;
-    } else {
-        pulses = choose_group(ramp, step, ramp->v >> part_log2(ramp), left);
     }
+    uint16_t pulses = choose_group(ramp, left);
     uint32_t change = step * pulses;
     if (!ramp->faster) {
         change = 0u - change;
         step = 0u - step;
     }
-    ramp->v += change;
-    if (!ramp->bounded)
-        v2 += change - step;
-    set_interval(ramp, interval_q16, v2);
+    uint32_t v_end = v + change;
+    ramp->v = v_end;
+    set_interval(ramp, interval_q16, ramp->bounded ? 2 * cap : v + v_end - step);
     return pulses;
 }
 
-/* At its end: *v_end, *x_end */
-static uint16_t linear_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16, uint32_t *v_end, wide_t *x_end)
+/* *change: of v^2. */
+static uint16_t linear_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16, wide_t *change)
 {
-    NEAR(v_end);
     choose_units(ramp);
-    uint16_t pulses =
-        choose_group(ramp, wide_half(&ramp->c, 1), wide_half(&ramp->x, 1) >> (part_log2(ramp) - 1), left);
-    wide_t change;
-    wide_copy(&change, &ramp->c);
-    wide_multiply(&change, pulses);
-    wide_copy(x_end, &ramp->x);
-    if (ramp->faster)
-        wide_add(x_end, &change);
-    else
-        wide_subtract(x_end, &change);
-    *v_end = wide_is_negative(x_end) ? 0 : wide_root(x_end);
-    set_interval(ramp, interval_q16, ramp->v + *v_end + 1); /* roots are rounded down */
+    uint16_t pulses = choose_group(ramp, left);
+    wide_copy(change, &ramp->c);
+    wide_multiply(change, pulses);
+    wide_change(&ramp->x, change, ramp->faster);
+    uint32_t v = ramp->v;
+    ramp->v = wide_is_negative(&ramp->x) ? 0 : wide_root(&ramp->x);
+    set_interval(ramp, interval_q16, v + ramp->v + 1); /* roots are rounded down */
     return pulses;
 }
 
@@ -431,17 +431,16 @@ uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *group
     uint32_t powers_q16[POWERS];
     bool fits;
     do {
-        uint32_t v_end;
-        wide_t x_end;
+        wide_t change;
         bool goes_on = ramp->linear && !ramp->bounded;
         if (goes_on) {
-            pulses = linear_next(ramp, few, &sum_q16, &v_end, &x_end);
+            pulses = linear_next(ramp, few, &sum_q16, &change);
         } else if (!ramp->linear) {
             pulses = harmonic_next(ramp, few, &sum_q16);
         } else {
             wide_copy(&sum_q16, &ramp->limit.bound_q16);
             set_ticks(ramp, &sum_q16);
-            pulses = choose_group(ramp, 0, 0, few);
+            pulses = choose_group(ramp, few);
         }
         wide_t last_q16;
         wide_copy(&last_q16, &sum_q16);
@@ -450,24 +449,25 @@ uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *group
             if (!ramp->bounded) {
                 shape(ramp, powers_q16, pulses);
                 uint32_t half = powers_q16[SLOPE] >> 1;
-                last_q16 = ramp->faster ? powers_q16[MEAN] - half : powers_q16[MEAN] + half;
+                wide_set(&last_q16, ramp->faster ? powers_q16[MEAN] - half : powers_q16[MEAN] + half);
             }
-            sum_q16 = powers_q16[MEAN] * pulses;
+            wide_set(&sum_q16, powers_q16[MEAN] * pulses);
         }
         fits = true;
         if (goes_on) {
             wide_subtract(&last_q16, &ramp->limit.bound_q16);
             fits = wide_is_negative(&last_q16) != ramp->faster;
-            if (fits) {
-                wide_copy(&ramp->x, &x_end);
-                ramp->v = v_end;
-            } else if (pulses > 1) {
-                ramp->most_log2 = (uint8_t)(ramp->group_log2 - 1);
-            } else {
-                /* All that is left: equal intervals, from this one on. */
-                ramp->most_log2 = GROUP_MAX_LOG2;
-                ramp->bounded = true;
-                few = 1;
+            if (!fits) {
+                wide_change(&ramp->x, &change, !ramp->faster);
+                ramp->v = wide_root(&ramp->x);
+                if (pulses > 1) {
+                    ramp->most_log2 = (uint8_t)(ramp->group_log2 - 1);
+                } else {
+                    /* All that is left: equal intervals, from this one on. */
+                    ramp->most_log2 = GROUP_MAX_LOG2;
+                    ramp->bounded = true;
+                    few = 1;
+                }
             }
         }
     } while (!fits);
