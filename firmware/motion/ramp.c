@@ -80,7 +80,7 @@ static NOINLINE void set_ticks(ramp_t *ramp, const wide_t *q16)
 /* By what part of its value, a power of two, the law's variable may change in a group. The parabola is off by no more than
  * 1/32 of the cube of that, of the interval: a 16,000th, or at less than 128 ticks a 2,000th. Steep ramps need groups that
  * last as long as it takes to plan them. */
-static NOINLINE uint8_t part_log2(const ramp_t *ramp)
+static uint8_t part_log2(const ramp_t *ramp)
 {
     return ramp->steep > 1 ? 1 : ramp->ticks < 128 ? 2 : 3;
 }
@@ -288,13 +288,6 @@ static NOINLINE void set_interval(ramp_t *ramp, wide_t *interval_q16, uint32_t v
     set_ticks(ramp, interval_q16);
 }
 
-/* Before the first group. */
-static NOINLINE void set_first_ticks(ramp_t *ramp, uint32_t v2)
-{
-    wide_t interval_q16;
-    set_interval(ramp, &interval_q16, v2);
-}
-
 NOINLINE void ramp_begin(ramp_t *ramp, const ramp_constants_t *constants, uint32_t v_most, uint32_t pulses)
 {
     ramp->rest = false;
@@ -323,7 +316,8 @@ NOINLINE void ramp_begin(ramp_t *ramp, const ramp_constants_t *constants, uint32
         ramp->rate = wide_half(rate, 1) ? UINT32_MAX : wide_half(rate, 0);
         first2 = 2 * (ramp->v < ramp->limit.cap ? ramp->v : ramp->limit.cap);
     }
-    set_first_ticks(ramp, first2);
+    wide_t interval_q16;
+    set_interval(ramp, &interval_q16, first2);
 }
 
 /* The next group of a law: its pulses, and the interval at the mean of the velocities at both ends. */
