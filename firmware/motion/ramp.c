@@ -23,7 +23,7 @@
 /* Runs: the interrupt's cycles for two segments, the planner's, and as much for others; and those of each pulse. */
 #define RUN_CYCLES 500u
 #define RUN_PULSE_CYCLES 24u
-#define RUN_SLOPE_Q8 496u /* change of the interval within a run */
+#define RUN_SLOPE_Q16 127200u /* change of the interval within a run */
 
 void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev, uint32_t clock_hz)
 {
@@ -153,14 +153,14 @@ typedef struct {
 static const series_t series_of[] FLASH = {SERIES(2.0), SERIES(3.0), SERIES(4.0),  SERIES(5.0),  SERIES(6.0),
                                            SERIES(7.0), SERIES(8.0), SERIES(16.0), SERIES(32.0), SERIES(1e9)};
 
-static uint32_t series(uint16_t pulses)
+static const series_t *series(uint16_t pulses)
 {
     uint8_t place = 6;
     if (pulses < 8)
         place = (uint8_t)(pulses - 2);
     for (; place < 9 && pulses >= 16; place++)
         pulses >>= 1;
-    return flash_u32(&series_of[place]);
+    return &series_of[place];
 }
 
 /* The shape of a group of several intervals, from the one at the mean of the velocities of its ends: that, times the part
@@ -182,13 +182,13 @@ static void shape(const ramp_t *ramp, uint32_t *powers_q16, uint16_t pulses)
         powers_q16[CURVE] += curve;
         return;
     }
-    uint32_t factors = series(pulses);
-    uint32_t fourth = factors & 0xFFFF0000u;
+    const series_t *factors = series(pulses);
+    uint32_t fourth = (uint32_t)flash_u16(&factors->fourth) << 16;
     uint32_t term = wide_fraction(powers_q16[FOURTH], fourth);
     curve += term;
     if (ramp->steep > 1)
         curve += wide_fraction(wide_fraction(wide_fraction(term, part), part), fourth);
-    powers_q16[MEAN] += wide_fraction(curve, factors << 16);
+    powers_q16[MEAN] += wide_fraction(curve, (uint32_t)flash_u16(&factors->second) << 16);
 }
 
 /* -- the laws ----------------------------------------------------------------------------------------------------- */
@@ -370,45 +370,41 @@ static void divide(ramp_t *ramp, uint16_t pulses, block_t *group, const uint32_t
         runs >>= 1;
         run = (uint8_t)(run << 1);
     }
-    uint8_t odd = (uint8_t)runs;
     uint32_t slope = powers_q16[SLOPE];
     uint32_t curve = powers_q16[CURVE];
-    /* How many pulses may share one or two timer values. */
-    uint16_t ticks = ramp->ticks;
-    uint8_t halvings = 0;
-    uint8_t run_pulse_ticks = (uint8_t)(RUN_PULSE_CYCLES >> ramp->cycles_log2);
-    if (ticks > run_pulse_ticks) {
-        uint16_t slope_q8 = slope < 1UL << 24 ? (uint16_t)(slope >> 8) : UINT16_MAX;
-        uint16_t span = (uint16_t)((ticks - run_pulse_ticks) * run);
-        uint16_t least = (uint16_t)((uint16_t)(2 * RUN_CYCLES + 2 * RUN_CYCLES * ramp->steep) >> ramp->cycles_log2);
-        uint16_t most = ticks < ramp->split_ticks ? RUN_SLOPE_Q8 / 4 : RUN_SLOPE_Q8;
-        if (odd > 1)
-            slope_q8 = (uint16_t)(slope_q8 / odd);
-        while (run > 1 && slope_q8 > most && span >= least) {
-            halvings++;
-            run >>= 1;
-            slope_q8 >>= 1;
-            span >>= 1;
-        }
-    }
-    ramp->run_pulses = run;
-    group->pulses = run;
-    odd = (uint8_t)(odd << halvings);
-    group->runs = odd;
-    /* The cubic part: so that two and four runs are right, and of more all nearly. */
-    uint8_t cubic_q8 = odd == 2 ? 16 : odd == 4 ? 36 : 48;
-    slope += wide_fraction(powers_q16[THIRD], (uint32_t)cubic_q8 << 24);
+    uint32_t third = powers_q16[THIRD];
     if (runs > 1) {
         uint32_t part = UINT32_MAX / runs; /* as good as 2^32 / runs */
         slope = wide_fraction(slope, part);
         curve = wide_fraction(wide_fraction(curve, part), part);
+        third = wide_fraction(third, part);
     }
-    slope >>= halvings;
-    curve >>= 2 * halvings;
+    uint8_t odd = (uint8_t)runs;
+    /* How many pulses may share one or two timer values. */
+    uint16_t ticks = ramp->ticks;
+    uint8_t run_pulse_ticks = (uint8_t)(RUN_PULSE_CYCLES >> ramp->cycles_log2);
+    if (ticks > run_pulse_ticks) {
+        uint16_t span = (uint16_t)((ticks - run_pulse_ticks) * run);
+        uint16_t least = (uint16_t)((uint16_t)(2 * RUN_CYCLES * (uint8_t)(ramp->steep + 1)) >> ramp->cycles_log2);
+        uint32_t most = ticks < ramp->split_ticks ? RUN_SLOPE_Q16 / 4 : RUN_SLOPE_Q16;
+        while (run > 1 && slope > most && span >= least) {
+            run >>= 1;
+            odd = (uint8_t)(odd << 1);
+            span >>= 1;
+            slope >>= 1;
+            third >>= 1;
+            curve >>= 2;
+        }
+    }
+    ramp->run_pulses = run;
+    group->pulses = run;
+    group->runs = odd;
+    /* The cubic part: so that two and four runs are right, and of more all nearly. */
+    uint8_t cubic_q8 = odd == 2 ? 16 : odd == 4 ? 36 : 48;
+    slope += wide_fraction(third, (uint32_t)cubic_q8 << 24);
     /* From the law's to the differences of the runs. */
     uint8_t steps = (uint8_t)(odd - 1);
-    uint32_t sum = curve * steps;
-    uint32_t bend = sum - curve;
+    uint32_t bend = curve * (uint8_t)(odd - 2); /* (of no use where there is one run only) */
     slope = ramp->faster ? 0u - slope : slope;
     slope -= (uint32_t)((int32_t)bend >> 1);
     group->slope_q16 = (int32_t)slope;
@@ -419,7 +415,9 @@ static void divide(ramp_t *ramp, uint16_t pulses, block_t *group, const uint32_t
 uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *group)
 {
     NEAR(sum);
-    uint16_t few = left > 4u << GROUP_MAX_LOG2 ? 4u << GROUP_MAX_LOG2 : (uint16_t)left;
+    uint16_t few = (uint16_t)left;
+    if (left > 4u << GROUP_MAX_LOG2)
+        few = 4u << GROUP_MAX_LOG2;
     uint16_t pulses;
     wide_t sum_q16;
     uint32_t powers_q16[POWERS];
