@@ -93,20 +93,20 @@ static void ramp_steps(wide_t *steps, const profile_basis_t *basis, const profil
     /* Within the slow range there are no ramps (manual lines 159, 169). */
     if (v_to <= basis->v_slow || centi == NO_RAMP_CENTI)
         return;
+    bool from_slow = v_from == basis->v_slow;
+    if (v_from > v_to) {
+        v_to = v_from;
+        v_from = profile->v_peak;
+    }
     if (!profile->linear) {
-        wide_set(steps, ((v_to > v_from ? v_to - v_from : v_from - v_to) >> basis->factor_log2) / centi);
+        wide_set(steps, ((v_to - v_from) >> basis->factor_log2) / centi);
         return;
     }
     linear_steps(steps, basis, v_to, centi);
-    if (v_from != basis->v_slow) { /* otherwise it starts from zero (decisions 0.2.4) */
-        wide_t from;
-        linear_steps(&from, basis, v_from, centi);
-        wide_subtract(&from, steps);
-        wide_copy(steps, &from);
-        if (wide_is_negative(&from)) {
-            wide_subtract(steps, &from);
-            wide_subtract(steps, &from);
-        }
+    if (!from_slow) { /* otherwise it starts from zero (decisions 0.2.4) */
+        wide_t less;
+        linear_steps(&less, basis, v_from, centi);
+        wide_subtract(steps, &less);
     }
 }
 
@@ -149,16 +149,16 @@ static void limit_peak(profile_t *profile, const profile_basis_t *basis)
 {
     NEAR(profile);
     uint32_t v_peak = profile->v_start;
-    uint32_t v_last = v_peak;
+    uint32_t v_last;
     uint32_t pulses = profile->accel_pulses;
     bool faster = profile->faster;
     if (pulses == 0) {
-        profile->v_peak = v_peak;
+        v_last = v_peak;
     } else if (profile->linear) {
         wide_t v2;
-        wide_set(&v2, 0);
-        if (v_peak != basis->v_slow || !faster)
-            ramp_square(&v2, v_peak);
+        if (v_peak == basis->v_slow && faster)
+            v_peak = 0;
+        ramp_square(&v2, v_peak);
         add_change(&v2, basis, pulses, profile->accel_centi, faster);
         v_peak = root(&v2);
         add_change(&v2, basis, 1, profile->accel_centi, !faster);
@@ -176,13 +176,13 @@ static void limit_peak(profile_t *profile, const profile_basis_t *basis)
 static bool is_steep(const profile_t *profile, const profile_basis_t *basis)
 {
     uint32_t pulses = profile->decel_pulses;
-    uint32_t step = (uint32_t)1 << basis->factor_log2;
+    uint8_t step = (uint8_t)(1u << basis->factor_log2);
     if (!profile->linear)
         return profile->v_peak - basis->v_slow > profile->decel_centi * (pulses + step);
     /* The v^2 that is left, after 2 % and four full steps more. */
     wide_t v2;
     ramp_square(&v2, profile->v_peak);
-    add_change(&v2, basis, pulses + pulses / 50 + 4 * step, profile->decel_centi, false);
+    add_change(&v2, basis, pulses + pulses / 50 + 4u * step, profile->decel_centi, false);
     return !wide_is_negative(&v2);
 }
 
@@ -256,7 +256,7 @@ NOINLINE void profile_plan(profile_t *profile, const profile_basis_t *basis, con
     wide_t accel;
     wide_t decel;
     ramp_steps(&accel, basis, profile, v_in, profile->accel_centi);
-    if (v_in == basis->v_slow && profile->decel_centi == profile->accel_centi)
+    if (v_in == basis->v_slow && command->decel == command->accel)
         wide_copy(&decel, &accel); /* saves half of the planning */
     else
         ramp_steps(&decel, basis, profile, basis->v_slow, profile->decel_centi);
@@ -287,8 +287,7 @@ NOINLINE void profile_plan(profile_t *profile, const profile_basis_t *basis, con
         if (profile->cruise_pulses == 0)
             profile->steep_decel = is_steep(profile, basis);
     } else if (profile->cruise_pulses != 0) {
-        profile->v_exit = v_target;
-        profile->exit_cycle_us = cycle_us;
+        profile->exit_cycle_us = profile->cycle_us;
     }
 }
 
