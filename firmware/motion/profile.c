@@ -88,6 +88,7 @@ static void linear_steps(wide_t *steps, const profile_basis_t *basis, uint32_t v
 static void ramp_steps(wide_t *steps, const profile_basis_t *basis, const profile_t *profile, uint32_t v_from,
                        uint32_t centi)
 {
+    NEAR(profile);
     uint32_t v_to = profile->v_peak;
     wide_set(steps, 0);
     /* Within the slow range there are no ramps (manual lines 159, 169). */
@@ -332,8 +333,7 @@ void profile_begin_ramp(const profile_t *profile, const profile_basis_t *basis, 
             if (profile->faster && v_most == basis->v_slow)
                 ramp->v = 0; /* (decisions 0.2.4) */
         } else {
-            wide_copy(bound_q16, &basis->ramp.k2_q16);
-            wide_divide(bound_q16, 2 * basis->v_slow);
+            ramp_interval_q16(bound_q16, &basis->ramp, basis->v_slow);
         }
         if (v_most < profile->v_peak)
             v_most = profile->v_peak;

@@ -52,10 +52,15 @@ static void set_time(ramp_time_t *time, const wide_t *q16)
     time->frac_q16 = (uint16_t)*q16;
 }
 
+NOINLINE void ramp_interval_q16(wide_t *q16, const ramp_constants_t *constants, uint32_t v)
+{
+    divide_k(q16, &constants->k2_q16, 2 * v);
+}
+
 ramp_time_t ramp_interval(const ramp_constants_t *constants, uint32_t v)
 {
     wide_t q16;
-    divide_k(&q16, &constants->k2_q16, 2 * v);
+    ramp_interval_q16(&q16, constants, v);
     ramp_time_t time;
     set_time(&time, &q16);
     return time;
@@ -269,7 +274,7 @@ static void begin_linear(ramp_t *ramp, const ramp_constants_t *constants, uint32
     ramp->rate = wide_half(x, 0);
     uint8_t bits = wide_bits(x);
     uint8_t most_bits = (uint8_t)(LINEAR_STEEP_LOG2 - 6u + 2u * ramp->cycles_log2);
-    ramp->steep = (uint8_t)((bits > most_bits) + (bits > most_bits + 6));
+    ramp->steep = (uint8_t)((bits > most_bits) + (bits > (uint8_t)(most_bits + 6)));
     ramp_square(x, ramp->v);
     if (ramp->v == 0 && !ramp->faster) {
         wide_copy(x, c);
@@ -414,7 +419,6 @@ static void divide(ramp_t *ramp, uint16_t pulses, block_t *group, const uint32_t
 
 uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *group)
 {
-    NEAR(sum);
     uint16_t few = (uint16_t)left;
     if (left > 4u << GROUP_MAX_LOG2)
         few = 4u << GROUP_MAX_LOG2;

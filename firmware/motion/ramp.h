@@ -64,7 +64,8 @@ typedef struct {
 /* steps_per_rev >= 8; clock_hz 400,000..16,000,000 */
 void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev, uint32_t clock_hz);
 
-/* Interval at a velocity. v >= 1. */
+/* Interval at a velocity, in 1/65536 tick and as a time. v >= 1. */
+void ramp_interval_q16(wide_t *q16, const ramp_constants_t *constants, uint32_t v);
 ramp_time_t ramp_interval(const ramp_constants_t *constants, uint32_t v);
 
 /* Velocity of an interval in ticks: the inverse. ticks >= 1. */
