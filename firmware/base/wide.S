@@ -1,6 +1,5 @@
-/* See wide.h. Cycles with call and return: add, subtract 96; multiply about 20 + 45 per zero-free byte of x and 13 per
- * product of two bytes: 420 for a 32-bit x; divide about 140 per byte of the quotient; root 1,200; shift 60
- * per whole byte and 75 per bit; copy 80; fraction 80. Little-endian, arguments by the avr-gcc calling convention. */
+/* See wide.h. Cycles with call and return: add, subtract 96; multiply 300; set 25; divide about 140 per byte of the quotient;
+ * root 1,200; shift 50 and 11 a bit; copy 80; fraction 80. Little-endian, arguments by the avr-gcc calling convention. */
 
         .section .text.wide_copy, "ax", @progbits
         .global wide_copy
@@ -13,6 +12,21 @@ wide_copy:
         st      Z+, r19
         dec     r18
         brne    1b
+        ret
+
+        .section .text.wide_set, "ax", @progbits
+        .global wide_set
+        .type wide_set, @function
+wide_set:                       /* r24 x, r20-r23 value */
+        movw    r30, r24
+        st      Z, r20
+        std     Z + 1, r21
+        std     Z + 2, r22
+        std     Z + 3, r23
+        std     Z + 4, r1
+        std     Z + 5, r1
+        std     Z + 6, r1
+        std     Z + 7, r1
         ret
 
         .section .text.wide_add, "ax", @progbits
@@ -47,47 +61,65 @@ wide_subtract:
         brne    1b
         ret
 
+        .section .text.wide_change, "ax", @progbits
+        .global wide_change
+        .type wide_change, @function
+wide_change:                    /* r24 x, r22 change, r20 add */
+        tst     r20
+        brne    1f
+        jmp     wide_subtract
+1:      jmp     wide_add
+
+/* \a... += x * y, the carry as far as there are registers. r16 is zero. */
+.macro add_product x, y, a, b, c, d, e
+        mul     \x, \y
+        add     \a, r0
+        adc     \b, r1
+        .ifnb \c
+        adc     \c, r16
+        .endif
+        .ifnb \d
+        adc     \d, r16
+        .endif
+        .ifnb \e
+        adc     \e, r16
+        .endif
+.endm
+
+/* Byte by byte of the product, in place: in r24, r25, r18, r19 the bytes of x that count for it, in r26, r27, r17 the sum of
+ * their products. */
         .section .text.wide_multiply, "ax", @progbits
         .global wide_multiply
         .type wide_multiply, @function
-wide_multiply:                  /* r24 product, r22 x, r20 y */
-        push    r28
-        push    r29
+wide_multiply:                  /* r24 x, r20-r23 factor */
         push    r16
+        push    r17
+        push    r28
         movw    r30, r24
-        ldi     r19, 8
-1:      st      Z+, r1
-        dec     r19
+        clr     r16
+        clr     r17
+        clr     r25
+        movw    r18, r16
+        movw    r26, r16
+        ldi     r28, 8          /* bytes */
+1:      ld      r24, Z
+        add_product r24, r20, r26, r27, r17
+        add_product r25, r21, r26, r27, r17
+        add_product r18, r22, r26, r27, r17
+        add_product r19, r23, r26, r27, r17
+        st      Z+, r26
+        mov     r26, r27
+        mov     r27, r17
+        clr     r17
+        mov     r19, r18
+        mov     r18, r25
+        mov     r25, r24
+        dec     r28
         brne    1b
-        ldi     r19, 8          /* bytes of y that still count */
-2:      movw    r26, r22
-        ld      r18, X+         /* a byte of x */
-        movw    r22, r26
-        tst     r18
-        breq    4f
-        movw    r30, r24        /* product from this byte on */
-        movw    r28, r20
-        mov     r16, r19
-        clr     r27             /* carry byte */
-        clr     r26             /* zero */
-3:      ld      r0, Y+
-        mul     r18, r0
-        add     r0, r27
-        adc     r1, r26
-        ld      r27, Z
-        add     r0, r27
-        adc     r1, r26
-        st      Z+, r0
-        mov     r27, r1
-        dec     r16
-        brne    3b
-4:      adiw    r24, 1
-        dec     r19
-        brne    2b
         clr     r1
-        pop     r16
-        pop     r29
         pop     r28
+        pop     r17
+        pop     r16
         ret
 
 /* Bit by bit: the remainder takes in one bit of x, and the divisor is taken off where it can be. */
@@ -211,50 +243,48 @@ wide_root:                      /* r24 x; returns r22-r25 */
         .global wide_shift
         .type wide_shift, @function
 wide_shift:                     /* r24 x, r22 bits */
-1:      movw    r30, r24
-        ldi     r18, 7
         tst     r22
-        breq    7f
-        brmi    4f
-        cpi     r22, 8
-        brlo    2f
-        subi    r22, 8
-3:      ldd     r19, Z + 1      /* a whole byte */
-        st      Z+, r19
-        dec     r18
-        brne    3b
-        st      Z, r1
-        rjmp    1b
-2:      dec     r22
-        adiw    r30, 8
-        inc     r18
-        clc
-2:      ld      r19, -Z
+        breq    5f
+        movw    r30, r24
+        ld      r18, Z
+        ldd     r19, Z + 1
+        ldd     r20, Z + 2
+        ldd     r21, Z + 3
+        ldd     r24, Z + 4
+        ldd     r25, Z + 5
+        ldd     r26, Z + 6
+        ldd     r27, Z + 7
+        brmi    3f
+2:      lsr     r27
+        ror     r26
+        ror     r25
+        ror     r24
+        ror     r21
+        ror     r20
         ror     r19
-        st      Z, r19
-        dec     r18
+        ror     r18
+        dec     r22
         brne    2b
-        rjmp    1b
-4:      cpi     r22, -7
-        brge    6f
-        subi    r22, -8
-        adiw    r30, 7
-5:      ld      r19, -Z
-        std     Z + 1, r19
-        dec     r18
-        brne    5b
-        st      Z, r1
-        rjmp    1b
-6:      inc     r22
-        inc     r18
-        clc
-6:      ld      r19, Z
+        rjmp    4f
+3:      lsl     r18
         rol     r19
-        st      Z+, r19
-        dec     r18
-        brne    6b
-        rjmp    1b
-7:      ret
+        rol     r20
+        rol     r21
+        rol     r24
+        rol     r25
+        rol     r26
+        rol     r27
+        inc     r22
+        brne    3b
+4:      st      Z, r18
+        std     Z + 1, r19
+        std     Z + 2, r20
+        std     Z + 3, r21
+        std     Z + 4, r24
+        std     Z + 5, r25
+        std     Z + 6, r26
+        std     Z + 7, r27
+5:      ret
 
         .section .text.wide_bits, "ax", @progbits
         .global wide_bits
@@ -276,21 +306,6 @@ wide_bits:                      /* r24 x */
 3:      ret
 
 /* Products of bytes i of x and j of y with i + j >= 3, summed in r17 (lost), r26, r27, r30, r31. */
-.macro add_product x, y, a, b, c, d, e
-        mul     \x, \y
-        add     \a, r0
-        adc     \b, r1
-        .ifnb \c
-        adc     \c, r16
-        .endif
-        .ifnb \d
-        adc     \d, r16
-        .endif
-        .ifnb \e
-        adc     \e, r16
-        .endif
-.endm
-
         .section .text.wide_fraction, "ax", @progbits
         .global wide_fraction
         .type wide_fraction, @function

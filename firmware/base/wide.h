@@ -11,16 +11,22 @@
 typedef uint64_t wide_t;
 
 #ifdef __AVR__
+void wide_set(wide_t *x, uint32_t value);
 void wide_copy(wide_t *to, const wide_t *from);
 void wide_add(wide_t *sum, const wide_t *x);           /* sum += x */
 void wide_subtract(wide_t *difference, const wide_t *x); /* difference -= x */
-void wide_multiply(wide_t *product, const wide_t *x, const wide_t *y); /* product = x * y, another object than x, y */
+void wide_change(wide_t *x, const wide_t *change, bool add); /* x += change or x -= change */
+void wide_multiply(wide_t *x, uint32_t factor);    /* x *= factor */
 uint32_t wide_divide(wide_t *x, uint32_t divisor); /* x /= divisor, truncated; returns the remainder. divisor >= 1 */
 uint32_t wide_root(const wide_t *x);               /* sqrt(x), truncated */
 uint8_t wide_bits(const wide_t *x);                /* of x without its leading zeros: 0..64 */
 void wide_shift(wide_t *x, int8_t bits);           /* x >>= bits, without sign; below 0: x <<= -bits; -64 < bits < 64 */
 uint32_t wide_fraction(uint32_t x, uint32_t y_q32); /* x * y / 2^32, less up to 4: products of the low bytes are left out */
 #else
+static inline void wide_set(wide_t *x, uint32_t value)
+{
+    *x = value;
+}
 static inline void wide_copy(wide_t *to, const wide_t *from)
 {
     *to = *from;
@@ -33,9 +39,13 @@ static inline void wide_subtract(wide_t *difference, const wide_t *x)
 {
     *difference -= *x;
 }
-static inline void wide_multiply(wide_t *product, const wide_t *x, const wide_t *y)
+static inline void wide_change(wide_t *x, const wide_t *change, bool add)
 {
-    *product = *x * *y;
+    *x = add ? *x + *change : *x - *change;
+}
+static inline void wide_multiply(wide_t *x, uint32_t factor)
+{
+    *x *= factor;
 }
 static inline uint32_t wide_divide(wide_t *x, uint32_t divisor)
 {
@@ -84,6 +94,12 @@ static inline uint32_t wide_half(const wide_t *x, uint8_t half)
     uint32_t bits;
     __builtin_memcpy(&bits, (const uint8_t *)x + 4 * half, sizeof bits);
     return bits;
+}
+
+/* The upper 32 bits of x. */
+static inline void wide_set_upper(wide_t *x, uint32_t bits)
+{
+    __builtin_memcpy((uint8_t *)x + 4, &bits, sizeof bits);
 }
 
 static inline bool wide_is_negative(const wide_t *x)

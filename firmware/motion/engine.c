@@ -112,7 +112,11 @@ static uint32_t us_of(uint32_t chunks, uint32_t ticks)
 {
     if (basis.ramp.cycles_log2 == 0)
         return (chunks << (PROFILE_CHUNK_LOG2 - 4)) + ticks / TICKS_PER_US;
-    return ramp_scale((chunks << PROFILE_CHUNK_LOG2) + ticks, 1000000, basis.ramp.clock_hz);
+    wide_t us;
+    wide_set(&us, (chunks << PROFILE_CHUNK_LOG2) + ticks);
+    wide_multiply(&us, 1000000);
+    wide_divide(&us, basis.ramp.clock_hz);
+    return wide_half(&us, 0);
 }
 
 /* The first pulse comes so long after the start wait: with those that are released together, a fixed time. */

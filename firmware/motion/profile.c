@@ -37,16 +37,15 @@ uint32_t profile_cycle_us(const profile_basis_t *basis, const motion_command_t *
 NOINLINE void profile_interval(const profile_basis_t *basis, uint32_t us, uint8_t halvings, profile_interval_t *interval)
 {
     NEAR(interval);
+    wide_t ticks_q9;
+    wide_set(&ticks_q9, us);
     if (basis->ramp.cycles_log2 == 0) { /* 16 ticks a microsecond */
-        uint8_t chunk_us_log2 = (uint8_t)(PROFILE_CHUNK_LOG2 - 4 + halvings);
-        interval->chunks = us >> chunk_us_log2;
-        interval->ticks_q8 = ((us & (((uint32_t)1 << chunk_us_log2) - 1)) << 12) >> halvings;
-        return;
+        halvings = (uint8_t)(halvings - 12);
+    } else {
+        wide_multiply(&ticks_q9, basis->ramp.clock_hz);
+        wide_shift(&ticks_q9, -8);
+        wide_divide(&ticks_q9, 1000000);
     }
-    wide_t ticks_q9 = us;
-    ramp_multiply(&ticks_q9, basis->ramp.clock_hz);
-    wide_shift(&ticks_q9, -8);
-    wide_divide(&ticks_q9, 1000000);
     wide_shift(&ticks_q9, (int8_t)(halvings - 1));
     interval->chunks = (uint32_t)wide_from_byte(&ticks_q9, 3);
     interval->ticks_q8 = (wide_half(&ticks_q9, 0) & 0xFFFFFFu) >> 1;
@@ -80,7 +79,7 @@ status_t profile_check(const profile_basis_t *basis, const motion_command_t *com
 static void linear_steps(wide_t *steps, const profile_basis_t *basis, uint32_t v, uint32_t centi)
 {
     ramp_square(steps, v >> basis->factor_log2);
-    ramp_multiply(steps, basis->ramp.steps_per_rev * (uint32_t)9);
+    wide_multiply(steps, basis->ramp.steps_per_rev * (uint32_t)9);
     wide_divide(steps, 1031324);
     wide_divide(steps, centi);
 }
@@ -89,25 +88,26 @@ static void linear_steps(wide_t *steps, const profile_basis_t *basis, uint32_t v
 static void ramp_steps(wide_t *steps, const profile_basis_t *basis, const profile_t *profile, uint32_t v_from,
                        uint32_t centi)
 {
+    NEAR(profile);
     uint32_t v_to = profile->v_peak;
-    *steps = 0;
+    wide_set(steps, 0);
     /* Within the slow range there are no ramps (manual lines 159, 169). */
     if (v_to <= basis->v_slow || centi == NO_RAMP_CENTI)
         return;
+    bool from_slow = v_from == basis->v_slow;
+    if (v_from > v_to) {
+        v_to = v_from;
+        v_from = profile->v_peak;
+    }
     if (!profile->linear) {
-        *steps = ((v_to > v_from ? v_to - v_from : v_from - v_to) >> basis->factor_log2) / centi;
+        wide_set(steps, ((v_to - v_from) >> basis->factor_log2) / centi);
         return;
     }
     linear_steps(steps, basis, v_to, centi);
-    if (v_from != basis->v_slow) { /* otherwise it starts from zero (decisions 0.2.4) */
-        wide_t from;
-        linear_steps(&from, basis, v_from, centi);
-        wide_subtract(&from, steps);
-        wide_copy(steps, &from);
-        if (wide_is_negative(&from)) {
-            wide_subtract(steps, &from);
-            wide_subtract(steps, &from);
-        }
+    if (!from_slow) { /* otherwise it starts from zero (decisions 0.2.4) */
+        wide_t less;
+        linear_steps(&less, basis, v_from, centi);
+        wide_subtract(steps, &less);
     }
 }
 
@@ -123,15 +123,13 @@ uint32_t profile_ramp_steps(const profile_basis_t *basis, uint32_t v_from, uint3
  * sprf each. */
 static void add_change(wide_t *v2, const profile_basis_t *basis, uint32_t pulses, uint32_t centi, bool add)
 {
-    wide_t change = pulses;
-    ramp_multiply(&change, centi << basis->factor_log2);
-    ramp_multiply(&change, 916732); /* 8 * 114591.559 to 5 parts in 10^7 */
+    wide_t change;
+    wide_set(&change, pulses);
+    wide_multiply(&change, centi << basis->factor_log2);
+    wide_multiply(&change, 916732); /* 8 * 114591.559 to 5 parts in 10^7 */
     wide_divide(&change, basis->ramp.steps_per_rev);
     wide_shift(&change, 3);
-    if (add)
-        wide_add(v2, &change);
-    else
-        wide_subtract(v2, &change);
+    wide_change(v2, &change, add);
 }
 
 static NOINLINE uint32_t root(const wide_t *x)
@@ -139,11 +137,12 @@ static NOINLINE uint32_t root(const wide_t *x)
     return wide_is_negative(x) ? 0 : wide_root(x);
 }
 
-static NOINLINE uint32_t limited(const profile_t *profile, uint32_t v)
+static NOINLINE uint32_t limited(uint32_t v, const profile_t *profile)
 {
     NEAR(profile);
     uint32_t most = profile->v_peak;
-    return (v > most) == profile->faster ? most : v;
+    bool beyond = v > most;
+    return beyond == profile->faster ? most : v;
 }
 
 /* The velocity that the acceleration reaches instead of v_peak, and that of its last interval: v_exit. */
@@ -151,15 +150,16 @@ static void limit_peak(profile_t *profile, const profile_basis_t *basis)
 {
     NEAR(profile);
     uint32_t v_peak = profile->v_start;
-    uint32_t v_last = v_peak;
+    uint32_t v_last;
     uint32_t pulses = profile->accel_pulses;
     bool faster = profile->faster;
     if (pulses == 0) {
-        profile->v_peak = v_peak;
+        v_last = v_peak;
     } else if (profile->linear) {
-        wide_t v2 = 0;
-        if (v_peak != basis->v_slow || !faster)
-            ramp_square(&v2, v_peak);
+        wide_t v2;
+        if (v_peak == basis->v_slow && faster)
+            v_peak = 0;
+        ramp_square(&v2, v_peak);
         add_change(&v2, basis, pulses, profile->accel_centi, faster);
         v_peak = root(&v2);
         add_change(&v2, basis, 1, profile->accel_centi, !faster);
@@ -169,21 +169,21 @@ static void limit_peak(profile_t *profile, const profile_basis_t *basis)
         v_peak += step * pulses;
         v_last = v_peak - step;
     }
-    profile->v_exit = limited(profile, v_last);
-    profile->v_peak = limited(profile, v_peak);
+    profile->v_exit = limited(v_last, profile);
+    profile->v_peak = limited(v_peak, profile);
 }
 
 /* Would the deceleration's pulses leave the velocity above slow speed? */
 static bool is_steep(const profile_t *profile, const profile_basis_t *basis)
 {
     uint32_t pulses = profile->decel_pulses;
-    uint32_t step = (uint32_t)1 << basis->factor_log2;
+    uint8_t step = (uint8_t)(1u << basis->factor_log2);
     if (!profile->linear)
         return profile->v_peak - basis->v_slow > profile->decel_centi * (pulses + step);
     /* The v^2 that is left, after 2 % and four full steps more. */
     wide_t v2;
     ramp_square(&v2, profile->v_peak);
-    add_change(&v2, basis, pulses + pulses / 50 + 4 * step, profile->decel_centi, false);
+    add_change(&v2, basis, pulses + pulses / 50 + 4u * step, profile->decel_centi, false);
     return !wide_is_negative(&v2);
 }
 
@@ -203,34 +203,37 @@ static NOINLINE void begin_plan(profile_t *profile, accel_code_t decel, bool lin
 }
 
 /* Splits the count, in full steps or pulses, into phases. True if the ramps had to be truncated. */
-static bool split(profile_t *profile, wide_t *wide_accel, wide_t *wide_decel, uint32_t total)
+static bool split(profile_t *profile, wide_t *accel, wide_t *decel, uint32_t total)
 {
     bool truncated = false;
-    uint32_t accel;
-    uint32_t decel;
-    uint32_t whole;
+    wide_t ramps;
     for (;;) {
-        accel = wide_half(wide_accel, 0);
-        decel = wide_half(wide_decel, 0);
-        whole = accel + decel;
-        if (wide_bits(wide_accel) <= 32 && wide_bits(wide_decel) <= 32 && whole >= accel)
+        wide_copy(&ramps, accel);
+        wide_add(&ramps, decel);
+        if (wide_half(&ramps, 1) == 0)
             break;
         /* Ramps beyond any command keep their ratio. */
-        wide_shift(wide_accel, 1);
-        wide_shift(wide_decel, 1);
+        wide_shift(accel, 1);
+        wide_shift(decel, 1);
         truncated = true;
     }
+    uint32_t whole = wide_half(&ramps, 0);
     if (whole > total)
         truncated = true;
+    uint32_t decel_pulses = wide_half(decel, 0);
     if (truncated) {
-        decel = ramp_scale(decel, total, whole);
-        if (decel > 1)
-            decel = total - ramp_scale(accel, total, whole);
+        wide_multiply(decel, total);
+        wide_divide(decel, whole);
+        decel_pulses = wide_half(decel, 0);
+        if (decel_pulses > 1) {
+            wide_multiply(accel, total);
+            wide_divide(accel, whole);
+            decel_pulses = total - wide_half(accel, 0);
+        }
         whole = total;
-        accel = total - decel;
     }
-    profile->accel_pulses = accel;
-    profile->decel_pulses = decel;
+    profile->accel_pulses = whole - decel_pulses;
+    profile->decel_pulses = decel_pulses;
     profile->cruise_pulses = total - whole;
     return truncated;
 }
@@ -254,7 +257,7 @@ NOINLINE void profile_plan(profile_t *profile, const profile_basis_t *basis, con
     wide_t accel;
     wide_t decel;
     ramp_steps(&accel, basis, profile, v_in, profile->accel_centi);
-    if (v_in == basis->v_slow && profile->decel_centi == profile->accel_centi)
+    if (v_in == basis->v_slow && command->decel == command->accel)
         wide_copy(&decel, &accel); /* saves half of the planning */
     else
         ramp_steps(&decel, basis, profile, basis->v_slow, profile->decel_centi);
@@ -285,8 +288,7 @@ NOINLINE void profile_plan(profile_t *profile, const profile_basis_t *basis, con
         if (profile->cruise_pulses == 0)
             profile->steep_decel = is_steep(profile, basis);
     } else if (profile->cruise_pulses != 0) {
-        profile->v_exit = v_target;
-        profile->exit_cycle_us = cycle_us;
+        profile->exit_cycle_us = profile->cycle_us;
     }
 }
 
@@ -326,13 +328,12 @@ void profile_begin_ramp(const profile_t *profile, const profile_basis_t *basis, 
         wide_t *bound_q16 = &ramp->limit.bound_q16;
         if (accel) {
             /* Whole full steps may pass the target a little: not beyond the interval of the cruise. */
-            *bound_q16 = (profile->cruise.chunks << (PROFILE_CHUNK_LOG2 + 8)) + profile->cruise.ticks_q8;
+            wide_set(bound_q16, (profile->cruise.chunks << (PROFILE_CHUNK_LOG2 + 8)) + profile->cruise.ticks_q8);
             wide_shift(bound_q16, -8);
             if (profile->faster && v_most == basis->v_slow)
                 ramp->v = 0; /* (decisions 0.2.4) */
         } else {
-            wide_copy(bound_q16, &basis->ramp.k2_q16);
-            wide_divide(bound_q16, 2 * basis->v_slow);
+            ramp_interval_q16(bound_q16, &basis->ramp, basis->v_slow);
         }
         if (v_most < profile->v_peak)
             v_most = profile->v_peak;

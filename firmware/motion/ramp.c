@@ -23,36 +23,20 @@
 /* Runs: the interrupt's cycles for two segments, the planner's, and as much for others; and those of each pulse. */
 #define RUN_CYCLES 500u
 #define RUN_PULSE_CYCLES 24u
-#define RUN_SLOPE_Q8 496u /* change of the interval within a run */
+#define RUN_SLOPE_Q16 127200u /* change of the interval within a run */
 
 void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev, uint32_t clock_hz)
 {
     constants->steps_per_rev = steps_per_rev;
     constants->clock_hz = clock_hz;
-    constants->k2_q16 = clock_hz;
-    ramp_multiply(&constants->k2_q16, 6000u * 131072u);
+    wide_set(&constants->k2_q16, clock_hz);
+    wide_multiply(&constants->k2_q16, 6000u * 131072u);
     wide_divide(&constants->k2_q16, steps_per_rev);
     uint8_t log2 = 0;
     for (uint8_t mhz_q4 = (uint8_t)(clock_hz >> 16); mhz_q4 < 128; mhz_q4 = (uint8_t)(mhz_q4 << 1))
         log2++;
     constants->cycles_log2 = log2;
     constants->split_ticks = log2 ? 0 : BLOCK_SPLIT_TICKS;
-}
-
-void ramp_multiply(wide_t *x, uint32_t factor)
-{
-    wide_t wide_factor = factor;
-    wide_t product;
-    wide_multiply(&product, &wide_factor, x); /* the shorter one first: faster */
-    wide_copy(x, &product);
-}
-
-uint32_t ramp_scale(uint32_t a, uint32_t b, uint32_t divisor)
-{
-    wide_t product = a;
-    ramp_multiply(&product, b);
-    wide_divide(&product, divisor);
-    return (uint32_t)product;
 }
 
 static NOINLINE void divide_k(wide_t *quotient, const wide_t *k2_q16, uint32_t divisor)
@@ -68,10 +52,15 @@ static void set_time(ramp_time_t *time, const wide_t *q16)
     time->frac_q16 = (uint16_t)*q16;
 }
 
+NOINLINE void ramp_interval_q16(wide_t *q16, const ramp_constants_t *constants, uint32_t v)
+{
+    divide_k(q16, &constants->k2_q16, 2 * v);
+}
+
 ramp_time_t ramp_interval(const ramp_constants_t *constants, uint32_t v)
 {
     wide_t q16;
-    divide_k(&q16, &constants->k2_q16, 2 * v);
+    ramp_interval_q16(&q16, constants, v);
     ramp_time_t time;
     set_time(&time, &q16);
     return time;
@@ -93,25 +82,18 @@ static NOINLINE void set_ticks(ramp_t *ramp, const wide_t *q16)
 
 /* -- groups ------------------------------------------------------------------------------------------------------ */
 
-/* 2^32 * part / whole. The result is below 2^32. */
-static uint32_t ratio_q32(uint32_t part, uint32_t whole)
-{
-    wide_t quotient = (wide_t)part << 32;
-    wide_divide(&quotient, whole);
-    return wide_half(&quotient, 0);
-}
-
 /* By what part of its value, a power of two, the law's variable may change in a group. The parabola is off by no more than
  * 1/32 of the cube of that, of the interval: a 16,000th, or at less than 128 ticks a 2,000th. Steep ramps need groups that
  * last as long as it takes to plan them. */
-static NOINLINE uint8_t part_log2(const ramp_t *ramp)
+static uint8_t part_log2(const ramp_t *ramp)
 {
     return ramp->steep > 1 ? 1 : ramp->ticks < 128 ? 2 : 3;
 }
 
-/* How many pulses the next group has: a power of two whose change, of so much a pulse, and duration are within the limits;
- * where fewer are left, so many whole runs as before. Down from twice the last group's size, which is nearly always enough. */
-static NOINLINE uint16_t choose_group(ramp_t *ramp, uint32_t change, uint32_t most_change, uint16_t left)
+/* How many pulses the next group has: a power of two whose change of the law's variable, of so much a pulse, and duration
+ * are within the limits; where fewer are left, so many whole runs as before. Down from twice the last group's size, which is
+ * nearly always enough. */
+static NOINLINE uint16_t choose_group(ramp_t *ramp, uint16_t left)
 {
     NEAR(ramp);
     uint16_t ticks = ramp->ticks;
@@ -127,8 +109,18 @@ static NOINLINE uint16_t choose_group(ramp_t *ramp, uint32_t change, uint32_t mo
     ramp->group_log2 = 0;
     if (ticks > GROUP_MAX_TICKS / 2)
         return (uint16_t)(1u << ramp->least_log2); /* often, near a standstill */
+    uint32_t change = ramp->step;
+    uint32_t most_change = ramp->v;
+    if (ramp->linear) {
+        change = wide_half(&ramp->c, 1);
+        most_change = 2 * wide_half(&ramp->x, 1);
+    }
+    if (ramp->bounded)
+        change = 0;
+    uint8_t part = part_log2(ramp);
+    most_change >>= part;
     if (!ramp->faster) {
-        ticks = (uint16_t)(ticks + (ticks >> part_log2(ramp))); /* they grow, and the variable shrinks */
+        ticks = (uint16_t)(ticks + (ticks >> part)); /* they grow, and the variable shrinks */
         most_change -= most_change >> 2;
     }
     if (++log2 > ramp->most_log2)
@@ -168,14 +160,14 @@ typedef struct {
 static const series_t series_of[] FLASH = {SERIES(2.0), SERIES(3.0), SERIES(4.0),  SERIES(5.0),  SERIES(6.0),
                                            SERIES(7.0), SERIES(8.0), SERIES(16.0), SERIES(32.0), SERIES(1e9)};
 
-static uint32_t series(uint16_t pulses)
+static const series_t *series(uint16_t pulses)
 {
     uint8_t place = 6;
     if (pulses < 8)
         place = (uint8_t)(pulses - 2);
     for (; place < 9 && pulses >= 16; place++)
         pulses >>= 1;
-    return flash_u32(&series_of[place]);
+    return &series_of[place];
 }
 
 /* The shape of a group of several intervals, from the one at the mean of the velocities of its ends: that, times the part
@@ -197,13 +189,13 @@ static void shape(const ramp_t *ramp, uint32_t *powers_q16, uint16_t pulses)
         powers_q16[CURVE] += curve;
         return;
     }
-    uint32_t factors = series(pulses);
-    uint32_t fourth = factors & 0xFFFF0000u;
+    const series_t *factors = series(pulses);
+    uint32_t fourth = (uint32_t)flash_u16(&factors->fourth) << 16;
     uint32_t term = wide_fraction(powers_q16[FOURTH], fourth);
     curve += term;
     if (ramp->steep > 1)
         curve += wide_fraction(wide_fraction(wide_fraction(term, part), part), fourth);
-    powers_q16[MEAN] += wide_fraction(curve, factors << 16);
+    powers_q16[MEAN] += wide_fraction(curve, (uint32_t)flash_u16(&factors->second) << 16);
 }
 
 /* -- the laws ----------------------------------------------------------------------------------------------------- */
@@ -220,8 +212,8 @@ static NOINLINE void divide_scaled(wide_t *x, uint32_t divisor, int8_t up)
 
 void ramp_square(wide_t *x, uint32_t v)
 {
-    wide_t wide_v = v;
-    wide_multiply(x, &wide_v, &wide_v);
+    wide_set(x, v);
+    wide_multiply(x, v);
 }
 
 /* Linear: velocity units so many times twice as large, or half as large (below 0). K gets what it has room for. */
@@ -262,32 +254,33 @@ static void begin_linear(ramp_t *ramp, const ramp_constants_t *constants, uint32
     NEAR(ramp);
     wide_t *c = &ramp->c;
     wide_t *x = &ramp->x;
-    uint8_t scale = 0;
-    while (v_most >> 29 == 0) {
-        v_most <<= 1;
-        ramp->v <<= 1;
-        scale++;
-    }
+    wide_set(x, v_most);
+    uint8_t scale = (uint8_t)(30 - wide_bits(x));
     scale_k(ramp, (int8_t)-scale);
+    ramp->v <<= scale;
+    uint8_t scale2 = (uint8_t)(2 * scale);
+    uint32_t divisor = pulses;
+    int8_t up = (int8_t)scale2;
     if (ramp->step) {
-        *c = ramp->step;
-        ramp_multiply(c, LINEAR_SQUARE_Q15);
-        divide_scaled(c, constants->steps_per_rev, (int8_t)(2 * scale - 15));
+        wide_set(c, ramp->step);
+        wide_multiply(c, LINEAR_SQUARE_Q15);
+        divisor = constants->steps_per_rev;
+        up = (int8_t)(scale2 - 15);
     } else {
         ramp_square(c, v_most);
-        wide_divide(c, pulses);
     }
-    wide_t rate;
-    wide_copy(&rate, c);
-    divide_scaled(&rate, k_by_128, (int8_t)(LINEAR_RATE_LOG2 - 14u - 2u * scale));
-    wide_divide(&rate, k_by_128);
-    ramp->rate = wide_half(&rate, 0);
-    uint32_t steep = ramp->rate >> (LINEAR_STEEP_LOG2 - 6u + 2u * ramp->cycles_log2);
-    ramp->steep = (uint8_t)((steep != 0) + (steep >> 6 != 0));
+    divide_scaled(c, divisor, up);
+    wide_copy(x, c);
+    divide_scaled(x, k_by_128, (int8_t)(LINEAR_RATE_LOG2 - 14u - scale2));
+    wide_divide(x, k_by_128);
+    ramp->rate = wide_half(x, 0);
+    uint8_t bits = wide_bits(x);
+    uint8_t most_bits = (uint8_t)(LINEAR_STEEP_LOG2 - 6u + 2u * ramp->cycles_log2);
+    ramp->steep = (uint8_t)((bits > most_bits) + (bits > (uint8_t)(most_bits + 6)));
     ramp_square(x, ramp->v);
     if (ramp->v == 0 && !ramp->faster) {
-        wide_t n = pulses;
-        wide_multiply(x, &n, c); /* exactly to a standstill */
+        wide_copy(x, c);
+        wide_multiply(x, pulses); /* exactly to a standstill */
         ramp->v = wide_root(x);
     }
     choose_units(ramp);
@@ -317,12 +310,18 @@ NOINLINE void ramp_begin(ramp_t *ramp, const ramp_constants_t *constants, uint32
     uint32_t first2;
     if (ramp->linear) {
         begin_linear(ramp, constants, k_by_128, v_most, pulses);
-        first2 = ramp->v ? 2 * ramp->v : wide_root(&ramp->c);
+        first2 = 2 * ramp->v;
+        if (first2 == 0)
+            first2 = wide_root(&ramp->c);
     } else {
         uint32_t step = ramp->step;
-        uint32_t steep = (k_by_128 << ramp->cycles_log2) >> 10; /* K / 2^17; a third: 2^18.6 */
+        uint32_t steep = k_by_128 >> (10u - ramp->cycles_log2); /* K / 2^17; a third: 2^18.6 */
         ramp->steep = (uint8_t)((step > steep) + (3 * step > steep));
-        ramp->rate = step < k_by_128 >> 1 ? ratio_q32(2 * step, k_by_128) : UINT32_MAX;
+        wide_t *rate = &ramp->x;
+        wide_set(rate, 0);
+        wide_set_upper(rate, 2 * step);
+        wide_divide(rate, k_by_128);
+        ramp->rate = wide_half(rate, 1) ? UINT32_MAX : wide_half(rate, 0);
         first2 = 2 * (ramp->v < ramp->limit.cap ? ramp->v : ramp->limit.cap);
     }
     wide_t interval_q16;
@@ -333,49 +332,38 @@ NOINLINE void ramp_begin(ramp_t *ramp, const ramp_constants_t *constants, uint32
 
 static uint16_t harmonic_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16)
 {
-    uint32_t v2 = 2 * ramp->v;
+    uint32_t v = ramp->v;
     uint32_t step = ramp->step;
-    uint32_t cap2 = 2 * ramp->limit.cap;
-    uint16_t pulses;
-    ramp->bounded = v2 > cap2;
+    uint32_t cap = ramp->limit.cap;
+    ramp->bounded = v > cap;
     if (ramp->bounded) {
-        uint32_t above = (ramp->v - ramp->limit.cap) / step + 1; /* so many pulses */
+        uint32_t above = (v - cap) / step + 1; /* so many pulses */
         if (above < left)
             left = (uint16_t)above;
-        pulses = choose_group(ramp, 0, 0, left);
-        v2 = cap2;
-    } else {
-        pulses = choose_group(ramp, step, ramp->v >> part_log2(ramp), left);
     }
+    uint16_t pulses = choose_group(ramp, left);
     uint32_t change = step * pulses;
     if (!ramp->faster) {
         change = 0u - change;
         step = 0u - step;
     }
-    ramp->v += change;
-    if (!ramp->bounded)
-        v2 += change - step;
-    set_interval(ramp, interval_q16, v2);
+    uint32_t v_end = v + change;
+    ramp->v = v_end;
+    set_interval(ramp, interval_q16, ramp->bounded ? 2 * cap : v + v_end - step);
     return pulses;
 }
 
-/* At its end: *v_end, *x_end */
-static uint16_t linear_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16, uint32_t *v_end, wide_t *x_end)
+/* *change: of v^2. */
+static uint16_t linear_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16, wide_t *change)
 {
-    NEAR(v_end);
     choose_units(ramp);
-    uint16_t pulses =
-        choose_group(ramp, wide_half(&ramp->c, 1), wide_half(&ramp->x, 1) >> (part_log2(ramp) - 1), left);
-    wide_t change;
-    wide_copy(&change, &ramp->c);
-    ramp_multiply(&change, pulses);
-    wide_copy(x_end, &ramp->x);
-    if (ramp->faster)
-        wide_add(x_end, &change);
-    else
-        wide_subtract(x_end, &change);
-    *v_end = wide_is_negative(x_end) ? 0 : wide_root(x_end);
-    set_interval(ramp, interval_q16, ramp->v + *v_end + 1); /* roots are rounded down */
+    uint16_t pulses = choose_group(ramp, left);
+    wide_copy(change, &ramp->c);
+    wide_multiply(change, pulses);
+    wide_change(&ramp->x, change, ramp->faster);
+    uint32_t v = ramp->v;
+    ramp->v = wide_is_negative(&ramp->x) ? 0 : wide_root(&ramp->x);
+    set_interval(ramp, interval_q16, v + ramp->v + 1); /* roots are rounded down */
     return pulses;
 }
 
@@ -390,45 +378,41 @@ static void divide(ramp_t *ramp, uint16_t pulses, block_t *group, const uint32_t
         runs >>= 1;
         run = (uint8_t)(run << 1);
     }
-    uint8_t odd = (uint8_t)runs;
     uint32_t slope = powers_q16[SLOPE];
     uint32_t curve = powers_q16[CURVE];
+    uint32_t third = powers_q16[THIRD];
+    if (runs > 1) {
+        uint32_t part = UINT32_MAX / runs; /* as good as 2^32 / runs */
+        slope = wide_fraction(slope, part);
+        curve = wide_fraction(wide_fraction(curve, part), part);
+        third = wide_fraction(third, part);
+    }
+    uint8_t odd = (uint8_t)runs;
     /* How many pulses may share one or two timer values. */
     uint16_t ticks = ramp->ticks;
-    uint8_t halvings = 0;
     uint8_t run_pulse_ticks = (uint8_t)(RUN_PULSE_CYCLES >> ramp->cycles_log2);
     if (ticks > run_pulse_ticks) {
-        uint16_t slope_q8 = slope < 1UL << 24 ? (uint16_t)(slope >> 8) : UINT16_MAX;
         uint16_t span = (uint16_t)((ticks - run_pulse_ticks) * run);
-        uint16_t least = (uint16_t)((uint16_t)(2 * RUN_CYCLES + 2 * RUN_CYCLES * ramp->steep) >> ramp->cycles_log2);
-        uint16_t most = ticks < ramp->split_ticks ? RUN_SLOPE_Q8 / 4 : RUN_SLOPE_Q8;
-        if (odd > 1)
-            slope_q8 = (uint16_t)(slope_q8 / odd);
-        while (run >> ramp->least_log2 > 1 && slope_q8 > most && span >= least) {
-            halvings++;
+        uint16_t least = (uint16_t)((uint16_t)(2 * RUN_CYCLES * (uint8_t)(ramp->steep + 1)) >> ramp->cycles_log2);
+        uint32_t most = ticks < ramp->split_ticks ? RUN_SLOPE_Q16 / 4 : RUN_SLOPE_Q16;
+        while (run >> ramp->least_log2 > 1 && slope > most && span >= least) {
             run >>= 1;
-            slope_q8 >>= 1;
+            odd = (uint8_t)(odd << 1);
             span >>= 1;
+            slope >>= 1;
+            third >>= 1;
+            curve >>= 2;
         }
     }
     ramp->run_pulses = run;
     group->pulses = run;
-    odd = (uint8_t)(odd << halvings);
     group->runs = odd;
     /* The cubic part: so that two and four runs are right, and of more all nearly. */
     uint8_t cubic_q8 = odd == 2 ? 16 : odd == 4 ? 36 : 48;
-    slope += wide_fraction(powers_q16[THIRD], (uint32_t)cubic_q8 << 24);
-    if (runs > 1) {
-        uint32_t part = ratio_q32(1, runs);
-        slope = wide_fraction(slope, part);
-        curve = wide_fraction(wide_fraction(curve, part), part);
-    }
-    slope >>= halvings;
-    curve >>= 2 * halvings;
+    slope += wide_fraction(third, (uint32_t)cubic_q8 << 24);
     /* From the law's to the differences of the runs. */
     uint8_t steps = (uint8_t)(odd - 1);
-    uint32_t sum = curve * steps;
-    uint32_t bend = sum - curve;
+    uint32_t bend = curve * (uint8_t)(odd - 2); /* (of no use where there is one run only) */
     slope = ramp->faster ? 0u - slope : slope;
     slope -= (uint32_t)((int32_t)bend >> 1);
     group->slope_q16 = (int32_t)slope;
@@ -438,24 +422,24 @@ static void divide(ramp_t *ramp, uint16_t pulses, block_t *group, const uint32_t
 
 uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *group)
 {
-    NEAR(sum);
-    uint16_t few = left > 4u << GROUP_MAX_LOG2 ? 4u << GROUP_MAX_LOG2 : (uint16_t)left;
+    uint16_t few = (uint16_t)left;
+    if (left > 4u << GROUP_MAX_LOG2)
+        few = 4u << GROUP_MAX_LOG2;
     uint16_t pulses;
     wide_t sum_q16;
     uint32_t powers_q16[POWERS];
     bool fits;
     do {
-        uint32_t v_end;
-        wide_t x_end;
+        wide_t change;
         bool goes_on = ramp->linear && !ramp->bounded;
         if (goes_on) {
-            pulses = linear_next(ramp, few, &sum_q16, &v_end, &x_end);
+            pulses = linear_next(ramp, few, &sum_q16, &change);
         } else if (!ramp->linear) {
             pulses = harmonic_next(ramp, few, &sum_q16);
         } else {
             wide_copy(&sum_q16, &ramp->limit.bound_q16);
             set_ticks(ramp, &sum_q16);
-            pulses = choose_group(ramp, 0, 0, few);
+            pulses = choose_group(ramp, few);
         }
         wide_t last_q16;
         wide_copy(&last_q16, &sum_q16);
@@ -464,24 +448,25 @@ uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *group
             if (!ramp->bounded) {
                 shape(ramp, powers_q16, pulses);
                 uint32_t half = powers_q16[SLOPE] >> 1;
-                last_q16 = ramp->faster ? powers_q16[MEAN] - half : powers_q16[MEAN] + half;
+                wide_set(&last_q16, ramp->faster ? powers_q16[MEAN] - half : powers_q16[MEAN] + half);
             }
-            sum_q16 = powers_q16[MEAN] * pulses;
+            wide_set(&sum_q16, powers_q16[MEAN] * pulses);
         }
         fits = true;
         if (goes_on) {
             wide_subtract(&last_q16, &ramp->limit.bound_q16);
             fits = wide_is_negative(&last_q16) != ramp->faster;
-            if (fits) {
-                wide_copy(&ramp->x, &x_end);
-                ramp->v = v_end;
-            } else if (pulses >> ramp->least_log2 > 1) {
-                ramp->most_log2 = (uint8_t)(ramp->group_log2 - 1);
-            } else {
-                /* All that is left: equal intervals, from this one on. */
-                ramp->most_log2 = GROUP_MAX_LOG2;
-                ramp->bounded = true;
-                few = 1;
+            if (!fits) {
+                wide_change(&ramp->x, &change, !ramp->faster);
+                ramp->v = wide_root(&ramp->x);
+                if (pulses >> ramp->least_log2 > 1) {
+                    ramp->most_log2 = (uint8_t)(ramp->group_log2 - 1);
+                } else {
+                    /* All that is left: equal intervals, from this one on. */
+                    ramp->most_log2 = GROUP_MAX_LOG2;
+                    ramp->bounded = true;
+                    few = pulses;
+                }
             }
         }
     } while (!fits);

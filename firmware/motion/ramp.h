@@ -65,7 +65,8 @@ typedef struct {
 /* steps_per_rev >= 8; clock_hz 400,000..16,000,000 */
 void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev, uint32_t clock_hz);
 
-/* Interval at a velocity. v >= 1. */
+/* Interval at a velocity, in 1/65536 tick and as a time. v >= 1. */
+void ramp_interval_q16(wide_t *q16, const ramp_constants_t *constants, uint32_t v);
 ramp_time_t ramp_interval(const ramp_constants_t *constants, uint32_t v);
 
 /* Velocity of an interval in ticks: the inverse. ticks >= 1. */
@@ -77,12 +78,6 @@ void ramp_begin(ramp_t *ramp, const ramp_constants_t *constants, uint32_t v_most
 
 /* x = v^2 */
 void ramp_square(wide_t *x, uint32_t v);
-
-/* x *= factor */
-void ramp_multiply(wide_t *x, uint32_t factor);
-
-/* a * b / divisor, truncated, where that fits 32 bits. divisor >= 1. */
-uint32_t ramp_scale(uint32_t a, uint32_t b, uint32_t divisor);
 
 /* The next group of at most `left` pulses (>= 1): returns how many, up to 512, and the sum of their intervals; that of
  * several is below 65,536 ticks. How these follow each other: `block`, of which runs, pulses, top, slope and curve are set;

@@ -55,28 +55,40 @@ static void test_products_are_modulo_two_to_the_64(void)
 {
     uint64_t state = 2;
     for (uint16_t i = 0; i < 500; i++) {
-        wide_t x = next_value(&state), y = next_value(&state), product = 77;
-        wide_multiply(&product, &x, &y);
-        TEST_ASSERT_TRUE(product == product_of(x, y));
+        wide_t x = next_value(&state), product = x;
+        uint32_t factor = (uint32_t)next_value(&state);
+        wide_multiply(&product, factor);
+        TEST_ASSERT_TRUE(product == product_of(x, factor));
     }
 }
 
 static void test_products_of_negative_numbers_are_right_modulo_two_to_the_64(void)
 {
     for (int16_t a = -300; a <= 300; a += 37) {
-        for (int16_t b = -300; b <= 300; b += 41) {
-            wide_t x = (wide_t)(int64_t)a, y = (wide_t)(int64_t)b, product;
-            wide_multiply(&product, &x, &y);
+        for (int16_t b = 0; b <= 300; b += 41) {
+            wide_t product = (wide_t)(int64_t)a;
+            wide_multiply(&product, (uint32_t)b);
             TEST_ASSERT_TRUE(product == (wide_t)((int64_t)a * b));
         }
     }
 }
 
-static void test_a_factor_may_be_multiplied_by_itself(void)
+static void test_the_largest_product_has_all_its_carries(void)
 {
-    wide_t x = 0xFFFFFFFFu, product;
-    wide_multiply(&product, &x, &x);
-    TEST_ASSERT_TRUE(product == 0xFFFFFFFE00000001u);
+    wide_t x;
+    wide_set(&x, UINT32_MAX);
+    wide_multiply(&x, UINT32_MAX);
+    TEST_ASSERT_TRUE(x == 0xFFFFFFFE00000001u);
+    x = UINT64_MAX;
+    wide_multiply(&x, UINT32_MAX);
+    TEST_ASSERT_TRUE(x == 0xFFFFFFFF00000001u);
+}
+
+static void test_setting_clears_the_upper_half(void)
+{
+    wide_t x = UINT64_MAX;
+    wide_set(&x, 0x12345678u);
+    TEST_ASSERT_TRUE(x == 0x12345678u);
 }
 
 static void test_a_fraction_is_the_upper_half_of_the_product_or_up_to_four_less(void)
@@ -123,7 +135,8 @@ int main(void)
     RUN_TEST(test_carries_run_through_all_eight_bytes);
     RUN_TEST(test_products_are_modulo_two_to_the_64);
     RUN_TEST(test_products_of_negative_numbers_are_right_modulo_two_to_the_64);
-    RUN_TEST(test_a_factor_may_be_multiplied_by_itself);
+    RUN_TEST(test_the_largest_product_has_all_its_carries);
+    RUN_TEST(test_setting_clears_the_upper_half);
     RUN_TEST(test_a_fraction_is_the_upper_half_of_the_product_or_up_to_four_less);
     RUN_TEST(test_shifts_go_both_ways_and_lose_what_leaves);
     RUN_TEST(test_32_bits_are_taken_from_any_of_the_lower_bytes);
