@@ -14,7 +14,7 @@
 #define RUN_MAX_PULSES 128u
 #define ODD_GROUP_LEAST 16u /* pulses of a group that are not a power of two */
 #define REST_PULSES 64u /* the least that is left for a fast ramp's last run */
-#define GROUP_MAX_TICKS 60000u /* below 65,536 also where it grows more than expected ... */
+#define GROUP_MAX_TICKS 64000u /* below 65,536: intervals that grow are taken for longer than they are ... */
 #define GROUP_MAX_STEEP_TICKS 49152u /* ... by up to a third, in a steep ramp */
 /* Of velocity units squared, a pulse, for a hundredth of rad/s^2, times steps_per_rev: 360,000 / pi * 2^15. */
 #define LINEAR_SQUARE_Q15 3754936206u
