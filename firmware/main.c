@@ -1,5 +1,6 @@
 /* Boot, then the polled loop: nothing else. */
 #include "base/atomic.h"
+#include "base/inline.h"
 #include "base/wake.h"
 #include "boot.h"
 #include "boot_port.h"
@@ -7,6 +8,7 @@
 #include "cli/terminal.h"
 #include "cli/terminal_port.h"
 #include "cli/timebase_port.h"
+#include "cli/trial.h"
 #include "drivers.h"
 #include "eeprom/store.h"
 #include "motion/engine.h"
@@ -21,13 +23,18 @@
 static status_t snapshot; /* what became of the saved queue ... */
 static bool saved;        /* ... and whether there is one */
 
+static NOINLINE void ports_init(void)
+{
+    terminal_port_init(settings.hw_baud);
+}
+
 void boot_restart(void)
 {
     const uint8_t ustep = drivers_ustep(settings.driver_id, settings.ustep);
     pins_microsteps(drivers_pins(settings.driver_id, ustep, settings.driver_map));
     engine_init();
     commands_init();
-    terminal_port_init(settings.hw_baud);
+    ports_init();
 }
 
 void boot_start(void)
@@ -41,13 +48,14 @@ void boot_restore_factory(void)
 {
     store_restore_factory();
     settings_to_factory();
+    trial_begin(false);
 }
 
 /* Where the start-up code ends (hal/start.S), and never left. */
 __attribute__((OS_main, section(".init9"))) int main(void)
 {
     pins_init();
-    store_load_settings();
+    trial_begin(store_load_settings());
     boot_init();
     boot_start();
     terminal_init(boot_cause() != STATUS_OK ? boot_cause() : snapshot == STATUS_SNAPSHOT ? snapshot : STATUS_OK);
@@ -71,6 +79,10 @@ __attribute__((OS_main, section(".init9"))) int main(void)
                 }
             }
             worked = terminal_poll(); /* first: a line's end is what wakes a unit at rest, and its motion is awaited */
+        }
+        if (trial_failed()) {
+            ports_init();
+            terminal_report(STATUS_TAKEN_BACK);
         }
         worked |= encoder_poll();
         worked |= engine_poll();
