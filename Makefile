@@ -65,6 +65,7 @@ FIRMWARE_SRCS := \
     firmware/hal/usart.c \
     firmware/cli/line.c \
     firmware/cli/terminal.c \
+    firmware/cli/trial.c \
     firmware/cli/commands.c \
     firmware/cli/motion_syntax.c \
     firmware/cli/configure.c \
@@ -80,11 +81,11 @@ FIRMWARE_SRCS := \
 # needed on the host alone, and assembler on the AVR alone.
 
 HOST_TESTS := test_number test_status test_baud test_line test_settings test_store test_session test_queue \
-    test_encoder test_ops test_motion_syntax test_commands test_configure test_display test_terminal test_fuzz test_boot test_drivers \
+    test_encoder test_ops test_motion_syntax test_commands test_configure test_display test_trial test_terminal test_fuzz test_boot test_drivers \
     test_wide test_block test_ramp test_profile test_engine test_property_planner test_processor_model
 FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 STORE_SRCS := firmware/eeprom/store.c firmware/base/crc16.c firmware/settings.c test/host/fakes/eeprom_port_fake.c
-CLI_SRCS := firmware/cli/commands.c firmware/cli/configure.c firmware/cli/display.c firmware/cli/text.c firmware/cli/motion_syntax.c \
+CLI_SRCS := firmware/cli/commands.c firmware/cli/trial.c firmware/cli/configure.c firmware/cli/display.c firmware/cli/text.c firmware/cli/motion_syntax.c \
     firmware/cli/range.c firmware/base/flash.c firmware/base/number.c firmware/queue/encoder.c firmware/queue/ops.c firmware/queue/queue.c firmware/queue/session.c $(STORE_SRCS) \
     test/host/fakes/encoder_port_fake.c $(FAKE_SRCS)
 test_number_SRCS := firmware/base/number.c
@@ -102,6 +103,7 @@ test_motion_syntax_SRCS := firmware/cli/motion_syntax.c firmware/cli/range.c fir
 test_commands_SRCS := $(CLI_SRCS)
 test_configure_SRCS := $(CLI_SRCS)
 test_display_SRCS := $(CLI_SRCS)
+test_trial_SRCS := firmware/cli/trial.c $(STORE_SRCS) test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 test_terminal_SRCS := $(CLI_SRCS) firmware/cli/terminal.c firmware/cli/line.c firmware/base/status.c
 test_fuzz_SRCS := $(test_terminal_SRCS)
 test_fuzz_HOST_SRCS := test/fuzz/grammar.c test/fuzz/reference.c

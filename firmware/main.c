@@ -1,5 +1,6 @@
 /* Boot, then the polled loop: nothing else. */
 #include "base/atomic.h"
+#include "base/inline.h"
 #include "base/wake.h"
 #include "boot.h"
 #include "boot_port.h"
@@ -7,6 +8,7 @@
 #include "cli/terminal.h"
 #include "cli/terminal_port.h"
 #include "cli/timebase_port.h"
+#include "cli/trial.h"
 #include "drivers.h"
 #include "eeprom/store.h"
 #include "motion/engine.h"
@@ -21,9 +23,14 @@
 static status_t snapshot; /* what became of the saved queue ... */
 static bool saved;        /* ... and whether there is one */
 
+static NOINLINE void ports_init(void)
+{
+    terminal_port_init(settings.hw_baud);
+}
+
 void boot_restart(void)
 {
-    terminal_port_init(settings.hw_baud); /* first: what is typed meanwhile is heard */
+    ports_init(); /* first: what is typed meanwhile is heard */
     engine_init();
     commands_init();
 }
@@ -39,13 +46,14 @@ void boot_restore_factory(void)
 {
     store_restore_factory();
     settings_to_factory();
+    trial_begin(false);
 }
 
 /* Where the start-up code ends (hal/start.S), and never left. */
 __attribute__((OS_main, section(".init9"))) int main(void)
 {
     pins_init();
-    store_load_settings();
+    trial_begin(store_load_settings());
     boot_init();
     boot_start();
     terminal_init(boot_cause() != STATUS_OK ? boot_cause() : snapshot == STATUS_SNAPSHOT ? snapshot : STATUS_OK);
@@ -69,6 +77,10 @@ __attribute__((OS_main, section(".init9"))) int main(void)
                 }
             }
             worked = terminal_poll(); /* first: a line's end is what wakes a unit at rest, and its motion is awaited */
+        }
+        if (trial_failed()) {
+            ports_init();
+            terminal_report(STATUS_TAKEN_BACK);
         }
         worked |= encoder_poll();
         worked |= engine_poll();

@@ -8,6 +8,7 @@
 #ifndef SETTINGS_H
 #define SETTINGS_H
 
+#include <stddef.h>
 #include <stdint.h>
 #include "base/flash.h"
 #include "motion/command.h"
@@ -43,6 +44,11 @@ typedef struct
 #define SETTING_BYTES_PAIR_0 sizeof(accel_code_t)
 #define SETTING_BYTES_PAIR_1 sizeof(accel_code_t)
 #define SETTING_BYTES_MAP 1 /* of one of the eight */
+
+/* How the unit is reached, by a terminal or in the network: these bytes, the last ones. A change of them is tried first
+ * (cli/trial.h). */
+#define SETTINGS_PATH offsetof(settings_t, network)
+#define SETTINGS_PATH_BYTES (sizeof(settings_t) - SETTINGS_PATH)
 
 extern settings_t settings;
 

@@ -82,7 +82,9 @@ def configuration(read):
     text = read("settings.def")
     kinds = dict(rows_of(KIND, text, "ranges"))
     defines = dict(DEFINE.findall(text))
-    for letter, kind, factory, name in rows_of(SETTING, text, "configuration"):
+    hidden = re.compile("[^A-Na-n]")  # those that are not on the screen stand last
+    rows = sorted(rows_of(SETTING, text, "configuration"), key=lambda row: "~" if hidden.match(row[0]) else row[0])
+    for letter, kind, factory, name in rows:
         yield code(letter), name or "-", kinds[kind], shown_factory(kind, factory, defines)
 
 

@@ -8,6 +8,7 @@
 #include "cli/motion_syntax.h"
 #include "cli/range.h"
 #include "cli/terminal_port.h"
+#include "cli/trial.h"
 #include "eeprom/store.h"
 #include "motion/engine.h"
 #include "queue/encoder.h"
@@ -381,7 +382,7 @@ static status_t command_reset(const char *rest)
     if (store_busy() || !terminal_port_idle()) {
         return STATUS_WAIT;
     }
-    (void)store_load_settings();
+    trial_begin(store_load_settings());
     boot_restart();
     return STATUS_OK;
 }

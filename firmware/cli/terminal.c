@@ -5,10 +5,12 @@
 #include "cli/commands.h"
 #include "cli/display.h"
 #include "cli/line.h"
+#include "cli/motion_syntax.h"
 #include "cli/range.h"
 #include "cli/terminal_port.h"
 #include "cli/text.h"
 #include "cli/timebase_port.h"
+#include "cli/trial.h"
 #include "version.h"
 
 /* At a high rate so many bytes are taken in one round of the main loop, but not beyond the end of a line, ... */
@@ -119,6 +121,12 @@ static void owe(struct terminal *t, status_t status)
     t->echoed = 0;
 }
 
+void terminal_report(status_t status)
+{
+    terminal.owed_status = status; /* before any other error */
+    owe(&terminal, status);
+}
+
 /* Brings the screen to what the line is, as far as the port has room. */
 static uint8_t echo(struct terminal *t)
 {
@@ -156,7 +164,11 @@ static void end_line(struct terminal *t)
     }
     status_t status = t->line.status;
     if (status == STATUS_OK) {
+        const uint8_t tried = trial_on(); /* asked before: $R comes by the path before */
         status = commands_execute(terminal.line.text, t->line.length); /* the motion first, then the answer */
+        if (status == STATUS_OK && tried && motion_syntax_more(t->line.text[0])) {
+            trial_confirm();
+        }
     } else {
         commands_read_ahead(terminal.line.text, 0);
     }

@@ -18,6 +18,8 @@
 /* The port is ready: prints the version line. The first polls print what is reported, if not STATUS_OK, and the prompt. */
 void terminal_init(status_t reported);
 
+void terminal_report(status_t status); /* is printed, as the answer to a line, and another prompt */
+
 uint8_t terminal_poll(void); /* takes a few bytes in, sends what is owed; not 0 if it did anything */
 
 #endif

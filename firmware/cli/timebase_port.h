@@ -1,4 +1,4 @@
-/* The clock of debug mode and boot; implemented by hal/timebase.c with Timer0, running always.
+/* The clock of debug mode, boot and trial; implemented by hal/timebase.c with Timer0, running always.
  *
  * Units:   microseconds, modulo 2^32, resolution 4. Context: main loop. Errors: none.
  * Tests:   test/host/fakes/timebase_port_fake.c; test/image. */
@@ -9,6 +9,7 @@
 
 void timebase_start(void); /* once, at boot */
 uint32_t timebase_us(void);
-uint8_t timebase_32ms(void); /* units of 32.768 ms, modulo 256 */
+uint8_t timebase_32ms(void);  /* units of 32.768 ms, modulo 256 */
+uint8_t timebase_262ms(void); /* units of 262.144 ms, modulo 256 */
 
 #endif

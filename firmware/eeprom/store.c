@@ -6,18 +6,20 @@
 #include "settings.h"
 
 enum {
-    OTHER_COPY = 64, /* the bit in which the addresses of the copies differ: 0 and 64 */
-    QUEUE_FIRST = 192,
+    OTHER_COPY = 128, /* the bit in which the addresses of the copies differ: 0 and 128 */
+    QUEUE_FIRST = 200,
     NOT_VALID = 0x00,
     ERASED = 0xFF, /* as every mark with the highest bit: not valid */
     QUEUE_MARK = 0x01, /* at both ends */
     SEQUENCE = 0x3F,   /* of the settings: counted in these bits, */
     SEQUENCE_MARK = 0x40, /* beside this one */
-    SETTINGS_BYTES = sizeof(settings_t),
+    PATH_KEPT = sizeof(settings_t), /* where in a copy the path stands a second time */
+    SETTINGS_BYTES = PATH_KEPT + SETTINGS_PATH_BYTES,
     QUEUE_BYTES = STORE_QUEUE_BYTES + 1,
     CHECKSUM_BYTES = 2,
 };
 _Static_assert(1 + SETTINGS_BYTES + CHECKSUM_BYTES <= OTHER_COPY, "a copy ends before the next one");
+_Static_assert(OTHER_COPY + 1 + SETTINGS_BYTES + CHECKSUM_BYTES <= QUEUE_FIRST, "and before the snapshot");
 _Static_assert(QUEUE_FIRST + 1 + QUEUE_BYTES + CHECKSUM_BYTES <= EEPROM_BYTES, "all fits in");
 
 static struct store {
@@ -35,8 +37,9 @@ static struct store {
     uint8_t change_offset, change_more;
     uint32_t change_value;
     const uint8_t *queue;
+    uint8_t path_first; /* from this byte on the record becomes the path in use: as the one kept, or as both */
 } the_store;
-enum { JOB_ERASE = 1 << 0, JOB_SETTINGS = 1 << 1, JOB_QUEUE = 1 << 2 };
+enum { JOB_ERASE = 1 << 0, JOB_PATH = 1 << 1, JOB_CHANGE = 1 << 2, JOB_QUEUE = 1 << 3 };
 
 /* To be asked for anew after a call, mostly: that is shorter than keeping it. */
 static inline struct store *self(void)
@@ -64,6 +67,30 @@ static NOINLINE uint8_t valid_mark(uint8_t first, uint16_t bytes)
     return crc == 0 && mark < 0x80 ? mark : NOT_VALID;
 }
 
+/* A byte of a copy to where in settings_t it stands: the path is there once. */
+static inline uint8_t in_settings(uint8_t i)
+{
+    return i < PATH_KEPT ? i : (uint8_t)(i - SETTINGS_PATH_BYTES);
+}
+
+/* The bytes of the newest copy from the last one down to that one; so the path kept comes first, then the one stored.
+ * True: they differ. */
+static NOINLINE bool load_down_to(uint8_t end)
+{
+    bool differ = false;
+    uint8_t i = SETTINGS_BYTES;
+    do {
+        i--;
+        const uint8_t stored = store_setting(i);
+        uint8_t *member = (uint8_t *)&settings + in_settings(i);
+        if ((uint8_t)(i - SETTINGS_PATH) < SETTINGS_PATH_BYTES && *member != stored) {
+            differ = true;
+        }
+        *member = stored;
+    } while (i != end);
+    return differ;
+}
+
 static NOINLINE uint8_t next_sequence(void)
 {
     return (uint8_t)(((the_store.sequence + 1) & SEQUENCE) | SEQUENCE_MARK);
@@ -72,7 +99,7 @@ static NOINLINE uint8_t next_sequence(void)
 #ifdef __AVR__
 __attribute__((noinline, noclone, used, externally_visible)) /* the tests' board writes settings when it has returned */
 #endif
-uint8_t store_load_settings(void)
+bool store_load_settings(void)
 {
     struct store *const store = self();
     store->jobs = 0;
@@ -86,12 +113,7 @@ uint8_t store_load_settings(void)
         store->sequence = other;
         store->newest = 0;
     }
-    uint8_t i = SETTINGS_BYTES;
-    do {
-        i--;
-        ((uint8_t *)&settings)[i] = store_setting(i);
-    } while (i != 0);
-    return store->sequence;
+    return load_down_to(0);
 }
 
 uint8_t store_setting(uint8_t i)
@@ -101,7 +123,7 @@ uint8_t store_setting(uint8_t i)
     if (store->sequence != NOT_VALID) {
         return eeprom_port_read(address);
     }
-    return flash_u8((const uint8_t *)&settings_factory + i);
+    return flash_u8((const uint8_t *)&settings_factory + in_settings(i));
 }
 
 /* The first of these jobs begins. */
@@ -113,17 +135,39 @@ static NOINLINE void begin(uint8_t jobs)
     store->tries = 0;
 }
 
+static NOINLINE void add_job(uint8_t job)
+{
+    begin(the_store.jobs | job);
+}
+
 status_t store_change(uint8_t offset, uint8_t more, uint32_t value)
 {
     struct store *const store = self();
-    if (store->jobs & (JOB_ERASE | JOB_SETTINGS)) {
+    if (store->jobs & (JOB_ERASE | JOB_CHANGE)) {
         return STATUS_WAIT;
     }
     store->change_offset = offset;
     store->change_more = more;
     store->change_value = value;
-    begin(store->jobs | JOB_SETTINGS); /* a save of the queue begins anew afterwards: what it has written is not written twice */
+    add_job(JOB_CHANGE); /* a save of the queue begins anew afterwards: what it has written is not written twice */
     return STATUS_OK;
+}
+
+static NOINLINE void write_path(uint8_t first)
+{
+    the_store.path_first = first;
+    add_job(JOB_PATH);
+}
+
+void store_keep_path(void)
+{
+    write_path(PATH_KEPT);
+}
+
+void store_take_back_path(void)
+{
+    (void)load_down_to(PATH_KEPT);
+    write_path(SETTINGS_PATH);
 }
 
 void store_restore_factory(void)
@@ -134,7 +178,7 @@ void store_restore_factory(void)
 void store_save_queue(const void *entries)
 {
     the_store.queue = entries;
-    begin(the_store.jobs | JOB_QUEUE);
+    add_job(JOB_QUEUE);
 }
 
 store_queue_t store_load_queue(void *entries)
@@ -162,12 +206,19 @@ uint8_t store_busy(void)
 static NOINLINE uint8_t wanted_byte(uint16_t i)
 {
     struct store *const store = self();
-    if (!(store->jobs & JOB_SETTINGS)) {
+    if (store->jobs == JOB_QUEUE) {
         return i < STORE_QUEUE_BYTES ? store->queue[i] : QUEUE_MARK;
     }
-    const uint8_t into_change = (uint8_t)(i - store->change_offset);
-    return into_change <= store->change_more ? ((const uint8_t *)&store->change_value)[into_change]
-                                             : store_setting((uint8_t)i);
+    const uint8_t at = (uint8_t)i;
+    const uint8_t into_change = (uint8_t)(at - store->change_offset);
+    if (store->jobs & JOB_PATH) {
+        if (at >= store->path_first) {
+            return ((const uint8_t *)&settings)[in_settings(at)];
+        }
+    } else if (into_change <= store->change_more) {
+        return ((const uint8_t *)&store->change_value)[into_change];
+    }
+    return store_setting(at);
 }
 
 /* The present job is over. */
@@ -214,7 +265,7 @@ static void save_on(void)
     struct store *const store = self();
     uint8_t first = QUEUE_FIRST, mark = QUEUE_MARK;
     uint16_t bytes = QUEUE_BYTES;
-    if (store->jobs & JOB_SETTINGS) {
+    if (store->jobs != JOB_QUEUE) {
         first = store->newest ^ OTHER_COPY;
         mark = next_sequence();
         bytes = SETTINGS_BYTES;
@@ -239,7 +290,7 @@ static void save_on(void)
     } else if (store->changed) {
         store->at = 0; /* another round */
     } else if (put(first, mark)) {
-        if (store->jobs & JOB_SETTINGS) {
+        if (store->jobs != JOB_QUEUE) {
             store->sequence = mark;
             store->newest = first;
         }

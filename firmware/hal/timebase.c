@@ -24,6 +24,11 @@ uint8_t timebase_32ms(void)
     return (uint8_t)(high << 3 | low >> 5);
 }
 
+uint8_t timebase_262ms(void)
+{
+    return ((const volatile uint8_t *)&timebase_overflows)[1];
+}
+
 uint32_t timebase_us(void)
 {
     /* The atomic section stays short: the flag, the low byte and the count are compared afterwards. */

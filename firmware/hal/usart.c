@@ -31,7 +31,7 @@ void terminal_port_init(uint32_t baud)
     usart->status_a = u2x;
     usart->divisor = divisor.ubrr;
     usart->control_c = _BV(UCSZ01) | _BV(UCSZ00); /* 8 data bits, no parity, 1 stop bit */
-    usart->control_b = USART_CONTROL | _BV(RXCIE0);
+    usart->control_b = USART_CONTROL | _BV(RXCIE0) | _BV(UDRIE0); /* output may be under way; if not, it is masked again */
 }
 
 int16_t terminal_port_get(void)

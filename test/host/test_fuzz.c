@@ -161,7 +161,7 @@ typedef struct {
     const char *prompt;
 } look_t;
 
-enum { SNAPSHOT = 192 }; /* its mark, then its entries */
+enum { SNAPSHOT = 200 }; /* its mark, then its entries */
 
 static look_t before, after;
 

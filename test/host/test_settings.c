@@ -55,11 +55,13 @@ static void test_the_values_lie_in_the_order_of_the_table_without_padding(void)
 {
     TEST_ASSERT_EQUAL_size_t(53, sizeof settings);
     TEST_ASSERT_EQUAL_size_t(0, offsetof(settings_t, autorun));
-    TEST_ASSERT_EQUAL_size_t(14, offsetof(settings_t, steps_per_rev));
-    TEST_ASSERT_EQUAL_size_t(16, offsetof(settings_t, cycle_us));
-    TEST_ASSERT_EQUAL_size_t(24, offsetof(settings_t, accel));
-    TEST_ASSERT_EQUAL_size_t(36, offsetof(settings_t, hw_baud));
-    TEST_ASSERT_EQUAL_size_t(45, offsetof(settings_t, driver_map));
+    TEST_ASSERT_EQUAL_size_t(12, offsetof(settings_t, steps_per_rev));
+    TEST_ASSERT_EQUAL_size_t(14, offsetof(settings_t, cycle_us));
+    TEST_ASSERT_EQUAL_size_t(22, offsetof(settings_t, accel));
+    TEST_ASSERT_EQUAL_size_t(35, offsetof(settings_t, driver_map));
+    TEST_ASSERT_EQUAL_size_t(43, SETTINGS_PATH); /* E, M, m, n, and nothing else */
+    TEST_ASSERT_EQUAL_size_t(45, offsetof(settings_t, hw_baud));
+    TEST_ASSERT_EQUAL_size_t(10, SETTINGS_PATH_BYTES);
 }
 
 int main(void)

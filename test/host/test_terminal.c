@@ -1,13 +1,18 @@
 /* cli/terminal: what is typed, what comes back, and in which order. */
 #include "cli/terminal.h"
+#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 #include "cli/commands.h"
+#include "cli/trial.h"
+#include "eeprom/store.h"
+#include "host/fakes/eeprom_port_fake.h"
 #include "host/fakes/engine_fake.h"
 #include "host/fakes/terminal_port_fake.h"
 #include "host/fakes/timebase_port_fake.h"
 #include "queue/queue.h"
 #include "queue/session.h"
+#include "settings.h"
 #include "unity.h"
 
 static void run(void)
@@ -23,6 +28,8 @@ void setUp(void)
 {
     terminal_port_fake_reset();
     engine_fake_reset();
+    eeprom_fake_reset();
+    trial_begin(store_load_settings());
     commands_init();
     queue_init();
     timebase_fake_us = 0;
@@ -116,6 +123,81 @@ static void test_escape_clears_the_line_and_shows_a_new_prompt(void)
     TEST_ASSERT_EQUAL_STRING("m999\r\nSAC>m5\r\nSAC>", answer("m999\x1Bm5\r"));
     TEST_ASSERT_EQUAL_UINT(1, engine_fake.submitted_count);
     TEST_ASSERT_EQUAL_UINT32(5, engine_fake.submitted[0].count);
+}
+
+/* Decisions 0.3.7: any command that is executed, in any mode; + and - are no lines, and noise could be one. */
+static void test_a_line_without_an_error_confirms_a_path_on_trial_and_nothing_else_does(void)
+{
+    static const char *const nothing[] = {"k\r", "m200k\r", "\r", " \r", " m5\r", "85m200\r", "v0\r", "m5\x1B", "m5\b\b\r", "+-", "m5"};
+    static const char *const commands[] = {"m5\r", "v20\r", "p\r", "$CL20\r", "$R\r", "xp\r", "5\bS\r", "p the rest is ignored\r"};
+    for (size_t i = 0; i < sizeof nothing / sizeof *nothing; i++) {
+        setUp();
+        trial_begin(true);
+        (void)trial_failed();
+        answer(nothing[i]);
+        TEST_ASSERT_TRUE_MESSAGE(trial_on(), nothing[i]);
+        TEST_ASSERT_FALSE(store_busy());
+        answer("\x1B");
+    }
+    trial_begin(true);
+    (void)trial_failed();
+    terminal_port_fake_type_byte(0xFF);
+    answer("p\r");
+    TEST_ASSERT_TRUE(trial_on());
+    for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
+        setUp();
+        trial_begin(true);
+        (void)trial_failed();
+        answer(commands[i]);
+        TEST_ASSERT_FALSE_MESSAGE(trial_on(), commands[i]);
+        TEST_ASSERT_TRUE(store_busy());
+        while (store_poll()) {
+        }
+        run();
+    }
+}
+
+/* Decisions 0.3.7: it came by the path before. */
+static void test_the_restart_itself_and_what_follows_it_at_once_confirm_nothing(void)
+{
+    static const uint32_t baud = 250000;
+    TEST_ASSERT_EQUAL(STATUS_OK, store_change(offsetof(settings_t, hw_baud), 3, baud));
+    while (store_poll()) {
+    }
+    terminal_port_fake_press(1);
+    terminal_port_fake_type("$R\rp\r");
+    for (unsigned i = 0; i < 100; i++) {
+        TEST_ASSERT_FALSE(trial_failed());
+        terminal_poll();
+    }
+    TEST_ASSERT_EQUAL_size_t(0, terminal_port_fake_untaken());
+    TEST_ASSERT_EQUAL_UINT32(baud, settings.hw_baud);
+    TEST_ASSERT_TRUE(trial_on());
+    TEST_ASSERT_FALSE(store_busy());
+    answer("p\r");
+    TEST_ASSERT_FALSE(trial_on());
+}
+
+/* Decisions 0.3.7 */
+static void test_what_is_reported_stands_before_another_prompt_and_keeps_what_is_typed(void)
+{
+    terminal_report(STATUS_TAKEN_BACK);
+    TEST_ASSERT_EQUAL_STRING("\r\n?20 E M m n taken back\r\nSAC>", answer(""));
+    terminal_port_fake_hold(1);
+    terminal_port_fake_type("k\rk\rk\r");
+    run();
+    terminal_report(STATUS_TAKEN_BACK); /* errors are owed */
+    for (unsigned i = 0; i < 10; i++) {
+        terminal_port_fake_drain(1000);
+        run();
+    }
+    TEST_ASSERT_NOT_NULL(strstr(terminal_port_fake_text(), "\r\n?20 E M m n taken back\r\nSAC>"));
+    terminal_port_fake_hold(0);
+    answer("m1");
+    terminal_report(STATUS_TAKEN_BACK);
+    TEST_ASSERT_EQUAL_STRING("\r\n?20 E M m n taken back\r\nSAC>m1", answer(""));
+    TEST_ASSERT_EQUAL_STRING("7\r\nSAC>", answer("7\r"));
+    TEST_ASSERT_EQUAL_UINT32(17, engine_fake.submitted[0].count);
 }
 
 /* PUL-002, PUL-005 */
@@ -355,6 +437,9 @@ int main(void)
     RUN_TEST(test_a_blank_line_repeats_the_prompt_once);
     RUN_TEST(test_taking_a_character_back_removes_it_from_the_screen_and_the_command);
     RUN_TEST(test_escape_clears_the_line_and_shows_a_new_prompt);
+    RUN_TEST(test_a_line_without_an_error_confirms_a_path_on_trial_and_nothing_else_does);
+    RUN_TEST(test_the_restart_itself_and_what_follows_it_at_once_confirm_nothing);
+    RUN_TEST(test_what_is_reported_stands_before_another_prompt_and_keeps_what_is_typed);
     RUN_TEST(test_plus_and_minus_act_at_once_without_a_line_end_or_an_echo);
     RUN_TEST(test_a_minus_within_a_line_is_no_pulse);
     RUN_TEST(test_a_minus_after_a_lost_character_is_no_pulse);

@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define WRITTEN (250 * MS) /* by then a change has been stored, even in a blank copy: 56 bytes of 3.4 ms */
+#define WRITTEN (250 * MS) /* by then a change has been stored, even in a blank copy: 66 bytes of 3.4 ms */
 
 static const char factory_screen[] = "Config:\r\n"
                                      "A autorun\t0\ta sprf\t\t200\r\n"
@@ -171,7 +171,7 @@ static void test_a_blank_or_damaged_eeprom_brings_factory_settings(void)
     memcpy(cells, board_eeprom(board), sizeof cells);
     boot_with(cells);
     assert_shown("A autorun\t9\t");
-    cells[64 + 20] ^= 0x10; /* the newer copy */
+    cells[128 + 20] ^= 0x10; /* the newer copy */
     boot_with(cells);
     assert_shown("A autorun\t8\t");
     cells[20] ^= 0x10; /* the older one */
@@ -261,6 +261,230 @@ static void test_configuring_stops_the_motor(void)
     TEST_ASSERT_LESS_THAN_size_t(2000, pulses);
 }
 
+/* -- decisions 0.3.7: a new path is tried for a minute ---------------------------------------------------------------- */
+
+#define NEW_BAUD 250000u
+static const char taken_back[] = "\r\n?20 E M m n taken back\r\nSAC>";
+
+static void peer(uint32_t baud)
+{
+    image_sent();
+    board_uart_baud(board, baud);
+    image_run(20 * MS);
+    image_take_text();
+}
+
+/* To the new rate, with a second parameter that is not of the path. */
+static void restart_at_the_new_rate(void)
+{
+    image_do("$Cm250000");
+    image_do("$CL20");
+    image_run(WRITTEN);
+    image_send("$R\r");
+    peer(NEW_BAUD);
+}
+
+static void power_on_at(uint32_t baud)
+{
+    board_uart_baud(board, baud);
+    power_cycle();
+}
+
+static void assert_rate_stored(uint32_t baud)
+{
+    char shown[30];
+    snprintf(shown, sizeof shown, "m hw\t\t%u\r\n", baud);
+    assert_shown(shown);
+    assert_shown("L slow\t\t20\r\n");
+    image_assert_holds(image_display("vd"), "20 15000\r\n"); /* in effect, whatever became of the rate */
+}
+
+/* The unit speaks again at the rate before, so many cycles from `start` on. */
+static void assert_taken_back(uint64_t start, uint64_t least, uint64_t most)
+{
+    peer(BAUD);
+    image_run(start + least - board_cycle(board));
+    TEST_ASSERT_EQUAL_STRING("", board_uart_text(board));
+    image_run(most - least);
+    TEST_ASSERT_EQUAL_STRING(taken_back, board_uart_text(board));
+    image_run(WRITTEN);
+    assert_rate_stored(BAUD);
+    power_cycle();
+    assert_rate_stored(BAUD);
+}
+
+/* CFG-036 */
+static void test_a_rate_that_is_confirmed_stays(void)
+{
+    restart_at_the_new_rate();
+    image_run(58 * SECOND);
+    image_do("v30");
+    image_run(62 * SECOND);
+    TEST_ASSERT_EQUAL_STRING("", board_uart_text(board));
+    for (unsigned i = 0; i < 3; i++) {
+        assert_rate_stored(NEW_BAUD);
+        power_on_at(NEW_BAUD);
+        TEST_ASSERT_EQUAL_STRING("", board_uart_text(board));
+    }
+    image_run(62 * SECOND);
+    assert_rate_stored(NEW_BAUD);
+}
+
+static void test_a_rate_that_nobody_confirms_is_taken_back_after_a_minute(void)
+{
+    restart_at_the_new_rate();
+    assert_taken_back(board_cycle(board), 59 * SECOND, 61 * SECOND);
+}
+
+/* What is typed and refused, what nobody typed, and what is typed at the rate before. */
+static void test_refused_lines_and_noise_confirm_nothing(void)
+{
+    restart_at_the_new_rate();
+    const uint64_t start = board_cycle(board);
+    image_refused("k", "?1 unknown command");
+    image_refused("m200z", "?2 syntax");
+    image_do("");
+    image_do(" ");
+    uint32_t noise = 1;
+    for (unsigned i = 0; i < 2000; i++) {
+        noise = noise * 1664525u + 1013904223u;
+        const uint8_t byte = (uint8_t)(noise >> 24);
+        if (byte == '\r' || byte == '\n' || noise & 0x800000)
+            board_uart_send_bad(board, byte);
+        else
+            board_uart_send(board, &byte, 1);
+        if (i % 50 == 49)
+            image_send("\r");
+        image_run(MS);
+    }
+    peer(BAUD);
+    for (unsigned i = 0; i < 20; i++) {
+        image_send("v30\r");
+        image_sent();
+        image_run(SECOND);
+    }
+    board_uart_baud(board, NEW_BAUD);
+    image_send("\r"); /* what came as noise is refused */
+    image_sent();
+    assert_taken_back(start, 59 * SECOND, 61 * SECOND);
+}
+
+/* The transmitter is at work at that moment, and goes on by itself. */
+static void test_a_rate_is_taken_back_while_answers_are_being_sent(void)
+{
+    restart_at_the_new_rate();
+    uint16_t hw_baud = 0;
+    TEST_ASSERT_TRUE(board_symbol(board, "settings", &hw_baud));
+    hw_baud = (uint16_t)(hw_baud + offsetof(settings_t, hw_baud));
+    image_run(59 * SECOND);
+    while (board_peek32(board, hw_baud) == NEW_BAUD) {
+        image_send("k\r");
+        image_run(MS);
+    }
+    TEST_ASSERT_FALSE(board_uart_sending(board));
+    board_uart_baud(board, BAUD);
+    image_take_text();
+    image_run(100 * MS);
+    image_assert_holds(image_take_text(), taken_back + 2);
+    image_do("S");
+    assert_rate_stored(BAUD);
+}
+
+/* Who opens the port of a Nano resets it: so a reset begins the minute anew. */
+static void test_a_reset_or_a_loss_of_power_in_that_minute_begins_another_one(void)
+{
+    restart_at_the_new_rate();
+    image_run(40 * SECOND);
+    reset();
+    image_run(40 * SECOND);
+    power_on_at(NEW_BAUD);
+    const uint64_t start = board_cycle(board);
+    assert_taken_back(start, 58 * SECOND, 60 * SECOND); /* the minute began a second before the prompt */
+
+    restart_at_the_new_rate();
+    image_run(20 * SECOND);
+    reset();
+    assert_rate_stored(NEW_BAUD);
+    image_run(WRITTEN);
+    power_on_at(NEW_BAUD);
+    image_run(62 * SECOND);
+    assert_rate_stored(NEW_BAUD);
+}
+
+/* Power is switched off instead of typing $R. */
+static void test_a_new_rate_is_tried_after_a_loss_of_power_as_well(void)
+{
+    image_do("$CL20");
+    image_do("$Cm250000");
+    image_run(WRITTEN);
+    power_on_at(NEW_BAUD);
+    assert_taken_back(board_cycle(board), 58 * SECOND, 60 * SECOND);
+}
+
+/* $R came through the new path. */
+static void test_a_restart_confirms_as_any_command(void)
+{
+    restart_at_the_new_rate();
+    image_do("$R");
+    image_run(62 * SECOND);
+    assert_rate_stored(NEW_BAUD);
+}
+
+/* E, M and n: without effect on the terminal, tried all the same. */
+static void test_the_networks_parameters_are_tried_alike(void)
+{
+    image_do("$CM99");
+    image_do("$CE1");
+    image_do("$Cn9600");
+    image_do("$CL20");
+    image_do("$R");
+    assert_shown("M d_id\t\t99\t"); /* which confirms */
+    image_run(WRITTEN);
+    image_do("$CM100");
+    image_do("$CE0");
+    image_do("$Cn300");
+    image_do("$R");
+    assert_taken_back(board_cycle(board), 59 * SECOND, 61 * SECOND);
+    assert_shown("M d_id\t\t99\t");
+    assert_shown("E network\t1\t");
+    assert_shown("n sw\t\t9600\r\n");
+}
+
+/* The motor runs at 33 kHz, by autorun: nobody types a command. */
+static void test_what_is_taken_back_disturbs_no_motion(void)
+{
+    enum { SLOW_STEPS = 116, FAST_STEPS = 70000, LOOKED_AT = 45000 };
+    image_do("m116vc500000a999d999"); /* 58 s */
+    image_do("m70000v10000a10d10"); /* 2.5 s */
+    image_do("S");
+    image_do("qs");
+    image_do("$CA2");
+    image_do("$CL20");
+    image_do("$Cm250000");
+    image_run(5 * SECOND);
+    power_on_at(NEW_BAUD);
+    const uint64_t start = board_cycle(board);
+    board_uart_baud(board, BAUD);
+    image_take_text();
+    image_run(58 * SECOND + SECOND / 2);
+    TEST_ASSERT_EQUAL_STRING("", board_uart_text(board));
+    board_measures_clear(board);
+    image_run(SECOND * 3 / 2);
+    if (board_measures(board)->masked_max > 20)
+        image_fail("interrupts were off for %u cycles, up to 0x%x", board_measures(board)->masked_max,
+                   board_measures(board)->masked_max_pc);
+    TEST_ASSERT_EQUAL_STRING(taken_back, board_uart_text(board));
+    TEST_ASSERT_GREATER_THAN_size_t(LOOKED_AT, train.count);
+    const size_t first = train.count - LOOKED_AT;
+    TEST_ASSERT_LESS_THAN_UINT64(start + 58 * SECOND + SECOND * 3 / 4, train.pulse[first].cycle);
+    image_assert_intervals(first, LOOKED_AT - 1, 30 * US, 0);
+    image_do("l");
+    image_idle(5 * SECOND);
+    image_assert_pulses(SLOW_STEPS + FAST_STEPS - 1); /* the first one stands before the prompt */
+    TEST_ASSERT_EQUAL_INT32(SLOW_STEPS + FAST_STEPS, image_position());
+    assert_rate_stored(BAUD);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -275,5 +499,14 @@ int main(void)
     RUN_TEST(test_a_reset_while_a_value_is_stored_leaves_the_old_or_the_new_ones);
     RUN_TEST(test_the_list_of_what_is_stored_and_all_bytes_in_debug_mode);
     RUN_TEST(test_configuring_stops_the_motor);
+    RUN_TEST(test_a_rate_that_is_confirmed_stays);
+    RUN_TEST(test_a_rate_that_nobody_confirms_is_taken_back_after_a_minute);
+    RUN_TEST(test_refused_lines_and_noise_confirm_nothing);
+    RUN_TEST(test_a_rate_is_taken_back_while_answers_are_being_sent);
+    RUN_TEST(test_a_reset_or_a_loss_of_power_in_that_minute_begins_another_one);
+    RUN_TEST(test_a_new_rate_is_tried_after_a_loss_of_power_as_well);
+    RUN_TEST(test_a_restart_confirms_as_any_command);
+    RUN_TEST(test_the_networks_parameters_are_tried_alike);
+    RUN_TEST(test_what_is_taken_back_disturbs_no_motion);
     return UNITY_END();
 }

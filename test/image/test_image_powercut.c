@@ -21,7 +21,7 @@
 #include "queue/queue.h"
 
 enum {
-    QUEUE_CELLS = 192, /* from here on is the snapshot */
+    QUEUE_CELLS = 200, /* from here on is the snapshot */
     ENTRY_BYTES = 18,
     QUEUE_BYTES = QUEUE_LAST * ENTRY_BYTES,
     MOST_PULSES = 4000,

@@ -14,3 +14,8 @@ uint8_t timebase_32ms(void)
 {
     return (uint8_t)(timebase_fake_us >> 15);
 }
+
+uint8_t timebase_262ms(void)
+{
+    return (uint8_t)(timebase_fake_us >> 18);
+}
