@@ -33,19 +33,19 @@ NOINLINE status_t range_check(motion_syntax_t *number, uint8_t range)
 {
     NEAR(number);
     const char *text = range_text(range);
-    uint16_t least = 0;
+    uint32_t least = 0;
     number->limit = 0;
     for (uint8_t c; (c = flash_u8(text)) != '\0'; text++) {
         c = (uint8_t)(c - '0');
         if (c < 10) {
             number_add_digit(&number->limit, c);
-        } else if ((uint16_t)number->limit != 0) {
-            least = (uint16_t)number->limit;
+        } else if (number->limit != 0) {
+            least = number->limit;
             number->limit = 0;
         }
     }
     if (range == RANGE_OPS && (uint8_t)number->value != 0) {
-        least = (uint16_t)number->limit; /* there is nothing between its two values */
+        least = number->limit; /* there is nothing between its two values */
     }
     if (number->value > number->limit) {
         number->value = number->limit;

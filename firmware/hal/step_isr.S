@@ -320,6 +320,8 @@ INT0_vect:
         sbis    io(PINB), 2
         rjmp    2f
         ldi     r24, hi8(SEGMENT_SILENT)
+        sts     OCR1AH, r24             /* and long: what is over when the main loop comes is this period */
+        sts     OCR1AL, r24
         sts     OCR1BH, r24
         sts     OCR1BL, r24
         lds     r24, step_clock

@@ -200,16 +200,23 @@ static bool freeze_within_period(volatile timer1_t *timer, uint8_t tail)
 }
 
 /* The same with an external clock, which may stand still: a pulse that has begun is completed with it, in reasonable time,
- * or else with the internal one. */
+ * or else with the internal one, and silence follows. While the clock is away edges are missed: a pulse that begins just now
+ * is longer by one. */
 static bool freeze_external(volatile timer1_t *timer, bool patient)
 {
+    if (patient && PINB & 1 << 2)
+        return false;
     timer->control_b = MODE15_B;
     __asm__ __volatile__("nop\n\tnop"); /* until the pin can be read */
     if (!(PINB & 1 << 2))
         return true;
-    timer->control_b = patient ? step_clock : RUNNING;
-    if (patient)
+    if (patient) {
+        timer->control_b = step_clock;
         return false;
+    }
+    timer->top = SEGMENT_SILENT; /* and long: what is over then is this period */
+    timer->match = SEGMENT_SILENT;
+    timer->control_b = RUNNING;
     while (PINB & 1 << 2)
         ;
     timer->control_b = MODE15_B;

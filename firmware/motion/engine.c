@@ -189,7 +189,11 @@ void engine_init(void)
     profile_interval(&basis, settings.pulse_us, 0, &width);
     engine.width_ticks = (uint16_t)((width.ticks_q8 + 255) >> 8);
     /* In half microseconds. */
-    engine.adjust_q16 = (int16_t)(settings.xclk_counts - settings.ihd_counts) * (int32_t)(clock_hz / 15625u * 512u);
+    wide_t half_us_q20;
+    wide_set(&half_us_q20, clock_hz);
+    wide_multiply(&half_us_q20, 512u * 16u);
+    wide_divide(&half_us_q20, 15625);
+    engine.adjust_q16 = (int16_t)(settings.xclk_counts - settings.ihd_counts) * (int32_t)wide_half(&half_us_q20, 0) >> 4;
     engine.plain = settings.internal_clock && engine.adjust_q16 == 0;
     step_port_init();
     reset_gear();
@@ -671,9 +675,12 @@ static NOINLINE uint16_t next_group(uint16_t at_most, ramp_time_t *sum)
     }
     int32_t adjust_q16 = engine.adjust_q16;
     if (adjust_q16) {
-        b->top_q16 += (uint32_t)adjust_q16;
-        sum->ticks += (uint32_t)(adjust_q16 >> 16) * pulses;
-        engine.carry_q16 += (int32_t)((uint32_t)(uint16_t)adjust_q16 * pulses);
+        if (b->runs) {
+            b->top_q16 += (uint32_t)adjust_q16;
+        } else {
+            sum->ticks += (uint32_t)(adjust_q16 >> 16) * pulses;
+            engine.carry_q16 += (int32_t)((uint32_t)(uint16_t)adjust_q16 * pulses);
+        }
     }
     return steps;
 }
@@ -687,7 +694,7 @@ static void begin_closing(uint32_t ticks)
         set_interval((int32_t)(ticks - TAIL_TICKS), false);
     else
         tail = (uint16_t)ticks;
-    engine.tail_fast = tail < SEGMENT_EARLY1_BELOW_TICKS;
+    engine.tail_fast = early_of((uint16_t)(tail - 1)) != 0;
     engine.tail_ticks = engine.tail_fast ? SHORTEST_PIECE_TICKS : tail;
     engine.stage = STAGE_TAIL;
 }
@@ -779,7 +786,7 @@ static bool emit_other(void)
     if (stage == STAGE_REST || (stage == STAGE_GAP && engine.next))
         return false; /* (it will be joined) */
     uint32_t us = command.start_wait_us;
-    if (stage == STAGE_LEAD && us) {
+    if (stage == STAGE_LEAD && us >= SHORTEST_PIECE_TICKS / TICKS_PER_US) {
         command.start_wait_us = 0;
         set_silence(us);
         return true;
@@ -787,7 +794,8 @@ static bool emit_other(void)
     engine.stage = (stage_t)(stage + 1);
     uint16_t ticks = SHORTEST_PIECE_TICKS;
     if (stage == STAGE_LEAD) {
-        ticks = setup_ticks(); /* a short period of its own, because the state changes when it begins */
+        /* A short period of its own, because the state changes when it begins; a wait too short for one is in it. */
+        ticks = (uint16_t)(setup_ticks() + ticks_of_cycles((uint8_t)us * TICKS_PER_US));
     } else if (stage == STAGE_TAIL) {
         engine.tail_offset = step_head;
         engine.tail_awaited = true;
@@ -1131,7 +1139,7 @@ status_t engine_check(const motion_command_t *c)
 {
     uint16_t pulse_us = settings.pulse_us;
     if (settings.ihd_counts > settings.xclk_counts) /* as if pulses were longer by what is taken away */
-        pulse_us = (uint16_t)(pulse_us + (uint8_t)(settings.ihd_counts - settings.xclk_counts + 1) / 2);
+        pulse_us = (uint16_t)(pulse_us + (uint16_t)(settings.ihd_counts - settings.xclk_counts + 1) / 2);
     return profile_check(&basis, c, pulse_us);
 }
 

@@ -346,7 +346,7 @@ bool reference_setting(const char *text, settings_t *stored)
     case 'k': WITHIN(0, 2, crc_mode, byte);
     case 'a': WITHIN(1, 65535, steps_per_rev, (uint16_t)number);
     case 'b': WITHIN(2, UINT32_MAX, cycle_us, number);
-    case 'c': WITHIN(1, 6400000, xclk_hz, number);
+    case 'c': WITHIN(400000, 6400000, xclk_hz, number);
     case 'm': WITHIN(300, 2000000, hw_baud, number);
     case 'n': WITHIN(300, 38400, sw_baud, number);
     case 'h':

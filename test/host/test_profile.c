@@ -396,6 +396,83 @@ static void test_periods_below_2_us_or_the_pulse_and_1_us_are_refused(void)
     TEST_ASSERT_EQUAL(STATUS_VELOCITY_ZERO, profile_check(&basis, &command, 1));
 }
 
+/* CLK-010, CLK-015: the interrupt has less time where it cannot look ahead */
+static void test_with_an_external_clock_periods_below_8_us_or_the_pulse_and_6_us_are_refused(void)
+{
+    profile_basis(&basis, 200, 0, 10, 1000000);
+    command.flags = MOTION_CYCLE;
+    for (uint8_t pulse_us = 1; pulse_us < 40; pulse_us++) {
+        uint8_t least = pulse_us > 2 ? (uint8_t)(pulse_us + 6) : 8;
+        for (uint8_t us = 1; us < 50; us++) {
+            command.velocity = us;
+            TEST_ASSERT_EQUAL(us < least ? STATUS_PERIOD_TOO_SHORT : STATUS_OK,
+                              profile_check(&basis, &command, pulse_us));
+        }
+    }
+    command.flags = 0;
+    command.velocity = 37500;
+    TEST_ASSERT_EQUAL(STATUS_OK, profile_check(&basis, &command, 2));
+    command.velocity = 37501;
+    TEST_ASSERT_EQUAL(STATUS_PERIOD_TOO_SHORT, profile_check(&basis, &command, 2));
+    profile_basis(&basis, 200, 7, 10, 400000);
+    command.velocity = 292; /* 1027 us for 128 pulses of 8 us */
+    TEST_ASSERT_EQUAL(STATUS_OK, profile_check(&basis, &command, 2));
+    command.velocity = 293;
+    TEST_ASSERT_EQUAL(STATUS_PERIOD_TOO_SHORT, profile_check(&basis, &command, 2));
+}
+
+static const uint32_t clocks[] TABLE = {400000, 999999, 1000000, 1843200, 2000000, 3686400, 6400000, 16000000};
+#define CLOCKS (sizeof clocks / sizeof clocks[0])
+
+/* CLK-011, CLK-012: microseconds in ticks, rounded down to 1/256 of one */
+static void test_an_interval_has_as_many_ticks_as_the_clock_makes_in_it(void)
+{
+    static const uint32_t lengths[] TABLE = {1,     2,     3,      8,       30,        255,       3000,
+                                             32767, 32768, 65537, 1000001, 123456789, 4294967295};
+    for (uint8_t c = 0; c < CLOCKS; c++) {
+        uint32_t clock_hz = table_u32(&clocks[c]);
+        profile_basis(&basis, 200, 0, 10, clock_hz);
+        for (uint8_t i = 0; i < sizeof lengths / sizeof lengths[0]; i++) {
+            for (uint8_t halvings = 0; halvings < 8; halvings++) {
+                uint32_t us = table_u32(&lengths[i]);
+                /* Ticks * 2^16 / (1000000 * 2^halvings); the product of up to 2^32 and 2^24 leaves room for 2^8. */
+                uint64_t product = (uint64_t)us * clock_hz;
+                uint32_t divisor = (uint32_t)1000000 << halvings;
+                uint64_t ticks = product / divisor;
+                uint32_t rest_q8 = (uint32_t)((product % divisor << 8) / divisor);
+                profile_interval_t interval;
+                profile_interval(&basis, us, halvings, &interval);
+                TEST_ASSERT_EQUAL_UINT32((uint32_t)(ticks >> PROFILE_CHUNK_LOG2), interval.chunks);
+                TEST_ASSERT_EQUAL_UINT32((uint32_t)(ticks & (PROFILE_CHUNK_TICKS - 1)) << 8 | rest_q8,
+                                         interval.ticks_q8);
+            }
+        }
+    }
+}
+
+/* CLK-012: a plan is one of velocities; the clock is only in the intervals */
+static void test_the_clock_changes_no_count_and_no_velocity(void)
+{
+    for (uint8_t linear = 0; linear < 2; linear++) {
+        command = (motion_command_t){.count = 900, .velocity = 333, .accel = 250, .decel = 120};
+        command.flags = linear ? MOTION_LINEAR : 0;
+        profile_basis(&basis, 200, 2, 10, 16000000);
+        plan();
+        profile_t with_internal = profile;
+        TEST_ASSERT_EQUAL_UINT32(480000, basis.slow_ticks * 4);
+        for (uint8_t c = 0; c < CLOCKS; c++) {
+            uint32_t clock_hz = table_u32(&clocks[c]);
+            profile_basis(&basis, 200, 2, 10, clock_hz);
+            TEST_ASSERT_EQUAL_UINT32((uint32_t)(((uint64_t)clock_hz * 7500 + 999999) / 1000000), basis.slow_ticks);
+            plan();
+            assert_split(with_internal.accel_pulses, with_internal.cruise_pulses, with_internal.decel_pulses);
+            TEST_ASSERT_EQUAL_UINT32(with_internal.v_start, profile.v_start);
+            TEST_ASSERT_EQUAL_UINT32(with_internal.v_peak, profile.v_peak);
+            TEST_ASSERT_EQUAL_UINT32(with_internal.v_exit, profile.v_exit);
+        }
+    }
+}
+
 /* STA-016 */
 static void test_counts_reach_32_bits_and_no_further(void)
 {
@@ -507,6 +584,9 @@ int main(void)
     RUN_TEST(test_lower_values_make_longer_ramps);
     RUN_TEST(test_ramp_values_have_two_decimals_below_100_and_none_above);
     RUN_TEST(test_periods_below_2_us_or_the_pulse_and_1_us_are_refused);
+    RUN_TEST(test_with_an_external_clock_periods_below_8_us_or_the_pulse_and_6_us_are_refused);
+    RUN_TEST(test_an_interval_has_as_many_ticks_as_the_clock_makes_in_it);
+    RUN_TEST(test_the_clock_changes_no_count_and_no_velocity);
     RUN_TEST(test_counts_reach_32_bits_and_no_further);
     RUN_TEST(test_a_deceleration_alone_has_the_steps_of_its_ramp);
     RUN_TEST(test_all_360_entries_of_appendix_d_are_twice_the_formula);

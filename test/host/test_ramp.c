@@ -91,7 +91,7 @@ static void begin(const case_t *c)
     ramp.linear = true;
     ramp.faster = c->faster;
     ramp.v = 0;
-    ramp.limit.bound_q16 = c->faster ? 0 : (wide_t)(4800000u / SLOW_RPM / factor) << 16;
+    ramp.limit.bound_q16 = c->faster ? 0 : ((wide_t)constants.clock_hz * 3u << 16) / (10u * SLOW_RPM * factor);
     ramp.step = (uint32_t)c->centi * factor;
     ramp_begin(&ramp, &constants, wide_root(&v2) + 1, c->pulses);
 }
@@ -120,6 +120,52 @@ static void test_ramps_take_the_time_that_their_law_says(void)
         uint32_t ticks = (uint32_t)((run(c.pulses) + 32768) >> 16);
         uint32_t allowed = 1u + c.pulses / 1000u;
         TEST_ASSERT_UINT32_WITHIN_MESSAGE(allowed, c.ticks, ticks, "ticks of a case");
+    }
+}
+
+/* Frequencies, and the CPU cycles of a tick as a power of two, not more than there are. */
+typedef struct {
+    uint32_t hz;
+    uint8_t cycles_log2;
+} clock_case_t;
+
+static const clock_case_t clocks[] TABLE = {{400000, 5},  {500000, 5},  {999999, 4},  {1000000, 4}, {1048576, 3},
+                                            {1843200, 3}, {2000000, 3}, {3686400, 2}, {6400000, 1}, {16000000, 0}};
+#define CLOCKS (sizeof clocks / sizeof clocks[0])
+
+/* CLK-012 */
+static void test_ramps_take_the_same_time_with_another_clock(void)
+{
+    for (uint8_t k = 0; k < CLOCKS; k++) {
+        clock_case_t clock;
+        table_copy(&clock, &clocks[k]);
+        ramp_constants(&constants, 200, clock.hz);
+        for (uint8_t i = 0; i < CASES; i++) {
+            case_t c;
+            table_copy(&c, &cases[i]);
+            begin(&c);
+            uint32_t ticks = (uint32_t)((run(c.pulses) + 32768) >> 16);
+            uint32_t expected = (uint32_t)((uint64_t)c.ticks * clock.hz / 16000000u);
+            TEST_ASSERT_UINT32_WITHIN_MESSAGE(2u + c.pulses / 1000u, expected, ticks, "ticks of a case");
+        }
+    }
+}
+
+/* CLK-012 */
+static void test_constants_follow_the_clock(void)
+{
+    for (uint8_t k = 0; k < CLOCKS; k++) {
+        clock_case_t clock;
+        table_copy(&clock, &clocks[k]);
+        ramp_constants(&constants, 200, clock.hz);
+        TEST_ASSERT_EQUAL_UINT32(clock.hz, constants.clock_hz);
+        TEST_ASSERT_EQUAL_UINT8(clock.cycles_log2, constants.cycles_log2);
+        TEST_ASSERT_EQUAL_UINT8(clock.cycles_log2 ? 0 : BLOCK_SPLIT_TICKS, constants.split_ticks);
+        ramp_time_t t = ramp_interval(&constants, 7000); /* 70 RPM: 30 ms / 7 */
+        uint64_t q16 = ((uint64_t)clock.hz * 3u << 16) / 700u;
+        TEST_ASSERT_EQUAL_UINT32((uint32_t)(q16 >> 16), t.ticks);
+        TEST_ASSERT_UINT32_WITHIN(1, (uint16_t)q16, t.frac_q16);
+        TEST_ASSERT_UINT32_WITHIN(1 + 7000 / t.ticks, 7000, ramp_velocity(&constants, t.ticks + (t.frac_q16 >= 32768)));
     }
 }
 
@@ -355,6 +401,8 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_ramps_take_the_time_that_their_law_says);
+    RUN_TEST(test_ramps_take_the_same_time_with_another_clock);
+    RUN_TEST(test_constants_follow_the_clock);
     RUN_TEST(test_pieces_of_a_ramp_add_up_to_the_whole);
     RUN_TEST(test_the_runs_of_a_group_add_up_to_it);
     RUN_TEST(test_the_interval_at_a_speed_is_300000_us_by_rpm);

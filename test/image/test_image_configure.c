@@ -111,13 +111,13 @@ static void test_settings_outlast_many_losses_of_power(void)
         char line[30], shown[30];
         snprintf(line, sizeof line, "$CA%u", i);
         image_do(line);
-        snprintf(line, sizeof line, "$Cc%u", 1000 + i);
+        snprintf(line, sizeof line, "$Cc%u", 1000000 + i);
         image_do(line);
         image_run(WRITTEN);
         power_cycle();
         snprintf(shown, sizeof shown, "A autorun\t%u\t", i);
         assert_shown(shown);
-        snprintf(shown, sizeof shown, "c xfreq\t\t%u\r\n", 1000 + i);
+        snprintf(shown, sizeof shown, "c xfreq\t\t%u\r\n", 1000000 + i);
         assert_shown(shown);
     }
 }

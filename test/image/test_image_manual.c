@@ -6,6 +6,7 @@
  *   the motor stands                 time passes until it does
  *   keys ABC ESC                     these keys are pressed, without Return
  *   Estop to ground, Estop open      likewise sync and RST
+ *   xclk to 1 MHz                    the two posts are joined
  *   encoder N lines cw (or ccw)      it is turned, 4 ms a line
  *   power off and on, reset button; and: reset button, keys ESC ESC ESC
  *   N pulses on clk                  so many since the last such line; the firmware's own count is not asked
@@ -209,6 +210,8 @@ static void act(const char *what)
         if (strcmp(signals[0] ? signals + 1 : "", what) != 0)
             image_fail("expected %s, saw%s", what, signals);
         signals[0] = '\0';
+    } else if (strcmp(what, "xclk to 1 MHz") == 0) {
+        board_pin_wire(board, BOARD_PIN('B', 3), BOARD_PIN('D', 5));
     } else if (!ground(what)) {
         image_fail("not known: ... %s", what);
     }
