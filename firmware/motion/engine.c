@@ -119,10 +119,12 @@ static uint32_t us_of(uint32_t chunks, uint32_t ticks)
     return wide_half(&us, 0);
 }
 
-/* The first pulse comes so long after the start wait: with those that are released together, a fixed time. */
+/* The first pulse comes so long after the start wait: with those that are released together, a fixed time. A wait too short
+ * for a period of its own is part of it. */
 static uint16_t setup_ticks(void)
 {
-    return (uint16_t)(ticks_of_cycles(DIR_SETUP_CYCLES) + engine.width_ticks);
+    uint8_t wait_us = (uint8_t)command.start_wait_us;
+    return (uint16_t)(ticks_of_cycles((uint16_t)(DIR_SETUP_CYCLES + wait_us * TICKS_PER_US)) + engine.width_ticks);
 }
 
 static NOINLINE bool has_no_ramps(const motion_command_t *c)
@@ -794,8 +796,7 @@ static bool emit_other(void)
     engine.stage = (stage_t)(stage + 1);
     uint16_t ticks = SHORTEST_PIECE_TICKS;
     if (stage == STAGE_LEAD) {
-        /* A short period of its own, because the state changes when it begins; a wait too short for one is in it. */
-        ticks = (uint16_t)(setup_ticks() + ticks_of_cycles((uint8_t)us * TICKS_PER_US));
+        ticks = setup_ticks(); /* a short period of its own, because the state changes when it begins */
     } else if (stage == STAGE_TAIL) {
         engine.tail_offset = step_head;
         engine.tail_awaited = true;
