@@ -220,7 +220,7 @@ static void test_no_pulse_is_moved_by_a_turning_encoder(void)
         const char *line;
         unsigned cycle_us;
         uint64_t edges;
-    } cases[] = {{"m30000vc30a999d999", 30, 20 * US}, {"m100000vc10a999d999", 10, 20 * US}, {"m400000vc2a999d999", 2, 100 * US}};
+    } cases[] = {{"m30000vc30a999d999", 30, 20 * US}, {"m100000vc10a999d999", 10, 20 * US}, {"m400000vc2a999d999", 2, 100 * US + 1}} /* at all phases of its period */;
     image_off();
     image_power_on();
     IMAGE_SET(pulse_us, 1);
