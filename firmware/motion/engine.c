@@ -318,7 +318,8 @@ static void absorb_held(void)
     uint16_t held = (uint16_t)(pulses << gear_of(last));
     /* The cruise becomes shorter, or, where there is none, the ramps; the closing interval stays. */
     uint16_t left = pulses_left();
-    uint16_t given = left > held ? held : left ? (uint16_t)(left - 1) : 0;
+    uint16_t pulse = (uint16_t)(1u << engine.gear);
+    uint16_t given = left > held ? held : left > pulse ? (uint16_t)(left - pulse) : 0;
     engine.owed = (uint16_t)(engine.owed + held - given);
     take(&profile.decel_pulses, take(&profile.accel_pulses, take(&profile.cruise_pulses, given)));
 }
@@ -551,11 +552,14 @@ static void emit_flat(uint16_t pulses, uint32_t ticks)
     }
 }
 
-/* The phase's pulses that may be emitted, so many of them in one run: the last one of all has the closing interval. */
+/* The phase's pulses that may be emitted, so many of them in one run: the last one of all has the closing interval. What
+ * is no whole pulse at the end is left, from the last full step on, to a lower gear. */
 static NOINLINE uint16_t pulses_of_phase(void)
 {
     uint16_t pulse = (uint16_t)(1u << engine.gear);
     uint16_t most = (uint16_t)(pulses_left() - pulse);
+    if (most & (pulse - 1u))
+        most = (uint16_t)(most - ((most - to_full_step()) & ((1u << basis.factor_log2) - 1u)));
     uint32_t left = *engine.phase_left;
     if (left < most)
         most = (uint16_t)left;
@@ -684,8 +688,9 @@ static void begin_closing(uint32_t ticks)
     engine.stage = STAGE_TAIL;
 }
 
-/* The gear for the next pulse but one: so that pulses are not nearer than GEAR_CYCLES, and no part of a step is left. */
-static NOINLINE uint8_t wanted_gear(void)
+/* The gear for a pulse with which so much of the command is left: so that pulses are not nearer than GEAR_CYCLES, and no
+ * part of a step is left. */
+static NOINLINE uint8_t wanted_gear(uint16_t left)
 {
     uint16_t ticks = ramp.ticks;
     if (engine.ramp_state == MOTION_CRUISE)
@@ -693,7 +698,6 @@ static NOINLINE uint8_t wanted_gear(void)
     uint8_t gear = 0;
     for (; gear < basis.factor_log2 && ticks < ticks_of_cycles(GEAR_CYCLES); gear++)
         ticks = (uint16_t)(ticks << 1);
-    uint16_t left = (uint16_t)(pulses_left() - (1u << engine.gear));
     if (left >> basis.factor_log2 == 0) {
         while (left & ((1u << gear) - 1u))
             gear--;
@@ -707,11 +711,11 @@ static NOINLINE void emit_phase(void)
     uint16_t at_most = pulses_of_phase();
     uint16_t pulse = (uint16_t)(1u << engine.gear);
     uint8_t gear = engine.gear;
-    bool closing = at_most == 0;
+    bool closing = pulses_left() <= pulse;
     if (closing || engine.ahead_ticks || engine.owed >= pulse) {
         at_most = pulse;
     } else if (settings.auto_microstep) {
-        uint8_t wanted = wanted_gear();
+        uint8_t wanted = wanted_gear((uint16_t)(pulses_left() - pulse)); /* of the next pulse but one */
         if (wanted != gear) {
             /* At a full step: the pulse after the next interval is the first one of it. */
             uint16_t way = to_full_step();
@@ -719,7 +723,7 @@ static NOINLINE void emit_phase(void)
                 way = pulse;
                 gear = wanted;
             }
-            if (at_most > way)
+            if (at_most == 0 || at_most > way)
                 at_most = way;
         }
     }
@@ -740,7 +744,7 @@ static NOINLINE void emit_phase(void)
         begin_closing(ticks);
     } else if (pulses) {
         pulses = (uint16_t)(pulses >> engine.gear);
-        if (gear != engine.gear) {
+        if (gear != engine.gear && !settle(0)) { /* nothing is held from here on, nor has been: it is at a full step */
             set_gear(gear);
             engine.dir_due = true;
         }
@@ -964,7 +968,7 @@ static void choose_start_gear(void)
 {
     if (to_full_step() == 0) {
         choose_phase();
-        set_gear(wanted_gear());
+        set_gear(wanted_gear(pulses_left()));
         engine.ramp_state = MOTION_STANDBY;
     } else if (command.flags & MOTION_PULSES || command.extra_pulses) {
         set_gear(0); /* as it was stopped within a step, so it is within a step that the ratio changes */
@@ -1234,7 +1238,8 @@ void engine_stop(void)
  * (it ends by itself now, or it stands in the middle of a wait or of an interval longer than that of slow speed). */
 static NOINLINE uint32_t cut(void)
 {
-    allow_hold(0);
+    settle(0);
+    engine.owed = 0;
     step_snapshot_t at = step_port_snapshot();
     uint8_t first = (uint8_t)(at.tail - SEGMENT_BYTES);
     uint8_t offset = first;

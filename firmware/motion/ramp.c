@@ -339,9 +339,9 @@ static uint16_t harmonic_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16)
     uint16_t pulses;
     ramp->bounded = v2 > cap2;
     if (ramp->bounded) {
-        uint32_t above = (ramp->v - ramp->limit.cap) / step + 1; /* so many pulses */
+        uint32_t above = (ramp->v - ramp->limit.cap) / step + 1; /* so many pulses, rounded up to whole groups */
         if (above < left)
-            left = (uint16_t)above;
+            left = (uint16_t)((above - 1u) | ((1u << ramp->least_log2) - 1u)) + 1u;
         pulses = choose_group(ramp, 0, 0, left);
         v2 = cap2;
     } else {
@@ -481,7 +481,7 @@ uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *group
                 /* All that is left: equal intervals, from this one on. */
                 ramp->most_log2 = GROUP_MAX_LOG2;
                 ramp->bounded = true;
-                few = 1;
+                few = (uint16_t)(1u << ramp->least_log2);
             }
         }
     } while (!fits);
