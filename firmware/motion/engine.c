@@ -122,6 +122,12 @@ static uint16_t setup_ticks(void)
     return (uint16_t)(ticks_of_cycles(DIR_SETUP_CYCLES) + engine.width_ticks);
 }
 
+/* A period at whose beginning dir or MS1 to MS3 are set, at least. */
+static NOINLINE uint16_t turn_ticks(void)
+{
+    return (uint16_t)(ticks_of_cycles(TURN_CYCLES) + 1 + engine.width_ticks);
+}
+
 static NOINLINE bool has_no_ramps(const motion_command_t *c)
 {
     NEAR(c);
@@ -244,13 +250,27 @@ static NOINLINE uint16_t pulses_left(void)
     return run_of(profile.accel_pulses + profile.cruise_pulses + profile.decel_pulses);
 }
 
+/* Those of them that are made in this gear: not the last one, which has the closing interval, and, where something is left
+ * at the end that is no whole pulse, those up to the last full step only. */
+static NOINLINE uint16_t pulses_in_gear(void)
+{
+    uint16_t pulse = (uint16_t)(1u << engine.gear);
+    uint16_t left = pulses_left();
+    if (left <= pulse)
+        return 0;
+    left = (uint16_t)(left - pulse);
+    if (left & (pulse - 1u))
+        left = (uint16_t)(left - ((left - to_full_step()) & ((1u << basis.factor_log2) - 1u)));
+    return left;
+}
+
 /* Those of them that come after the next `planned` ones and may be repeated if the ring runs empty. */
 static NOINLINE uint8_t pulses_to_come(uint16_t planned)
 {
-    uint16_t left = pulses_left();
+    uint16_t left = pulses_in_gear();
     if (left <= planned)
         return 0;
-    left = (uint16_t)((uint16_t)(left - planned - 1) >> engine.gear);
+    left = (uint16_t)((uint16_t)(left - planned) >> engine.gear);
     return (uint8_t)(left > 254 ? 254 : left);
 }
 
@@ -394,7 +414,7 @@ static void push(uint16_t periods, uint16_t ticks, bool pulse)
     }
     if (periods)
         append_run(periods, ticks, pulse, (uint8_t)(engine.ramp_state | direction_flags(&command, turn)));
-    if (pulse && step_hold < HOLD_LEAST)
+    if (pulse && !turn && step_hold < HOLD_LEAST) /* (a period before another gear is not one to be repeated in it) */
         allow_hold(pulses_to_come(0));
 }
 
@@ -552,18 +572,14 @@ static void emit_flat(uint16_t pulses, uint32_t ticks)
     }
 }
 
-/* The phase's pulses that may be emitted, so many of them in one run: the last one of all has the closing interval. What
- * is no whole pulse at the end is left, from the last full step on, to a lower gear. */
+/* The phase's pulses that may be emitted, so many of them in one run. */
 static NOINLINE uint16_t pulses_of_phase(void)
 {
-    uint16_t pulse = (uint16_t)(1u << engine.gear);
-    uint16_t most = (uint16_t)(pulses_left() - pulse);
-    if (most & (pulse - 1u))
-        most = (uint16_t)(most - ((most - to_full_step()) & ((1u << basis.factor_log2) - 1u)));
+    uint16_t most = pulses_in_gear();
     uint32_t left = *engine.phase_left;
     if (left < most)
         most = (uint16_t)left;
-    return most & (uint16_t)(0u - pulse);
+    return most & (uint16_t)(0u - (1u << engine.gear));
 }
 
 /* Appends what the ring has room for of the block. */
@@ -657,7 +673,16 @@ static NOINLINE uint16_t next_group(uint16_t at_most, ramp_time_t *sum)
     uint8_t gear = engine.gear;
     ramp.least_log2 = gear;
     ramp.split_ticks = gear ? (uint8_t)0 : basis.ramp.split_ticks;
+    uint8_t part = (uint8_t)((1u << gear) - 1u);
     uint16_t steps = ramp_next(&ramp, at_most, sum, &block);
+    while (steps & part) { /* steep: in less than a pulse the velocity changes by much */
+        ramp_time_t more;
+        steps = (uint16_t)(steps + ramp_next(&ramp, (uint8_t)(0u - steps) & part, &more, &block));
+        uint32_t frac = (uint32_t)sum->frac_q16 + more.frac_q16;
+        sum->frac_q16 = (uint16_t)frac;
+        sum->ticks += more.ticks + (frac >> 16);
+        block.runs = 0;
+    }
     uint16_t pulses = (uint16_t)(steps >> gear);
     if (pulses == 1)
         block.runs = 0;
@@ -717,7 +742,10 @@ static NOINLINE void emit_phase(void)
     } else if (settings.auto_microstep) {
         uint8_t wanted = wanted_gear((uint16_t)(pulses_left() - pulse)); /* of the next pulse but one */
         if (wanted != gear) {
-            /* At a full step: the pulse after the next interval is the first one of it. */
+            /* At a full step: the pulse after the next interval is the first one of it. Nothing is held from here on, or it
+             * would not begin there. */
+            if (settle(0))
+                return;
             uint16_t way = to_full_step();
             if (way == 0) {
                 way = pulse;
@@ -744,9 +772,11 @@ static NOINLINE void emit_phase(void)
         begin_closing(ticks);
     } else if (pulses) {
         pulses = (uint16_t)(pulses >> engine.gear);
-        if (gear != engine.gear && !settle(0)) { /* nothing is held from here on, nor has been: it is at a full step */
+        if (gear != engine.gear) {
             set_gear(gear);
             engine.dir_due = true;
+            if (ticks < turn_ticks()) /* from within a step, at speed */
+                ticks = turn_ticks();
         }
         emit_flat(pulses, ticks);
     }
@@ -970,7 +1000,7 @@ static void choose_start_gear(void)
         choose_phase();
         set_gear(wanted_gear(pulses_left()));
         engine.ramp_state = MOTION_STANDBY;
-    } else if (command.flags & MOTION_PULSES || command.extra_pulses) {
+    } else if (!engine.endless && (command.flags & MOTION_PULSES || command.extra_pulses)) {
         set_gear(0); /* as it was stopped within a step, so it is within a step that the ratio changes */
     }
     pins_microsteps(engine.gear_bits >> SEGMENT_MS_SHIFT);
@@ -1095,7 +1125,7 @@ static void join_next(void)
         if (waits) {
             flags = tail->flags;
         } else {
-            uint16_t least = (uint16_t)(ticks_of_cycles(TURN_CYCLES) + 1 + engine.width_ticks);
+            uint16_t least = turn_ticks();
             top = (uint16_t)(top + ticks_of_cycles((uint8_t)wait_us * TICKS_PER_US));
             if (turns && top < least)
                 top = least;

@@ -126,7 +126,7 @@ static NOINLINE uint16_t choose_group(ramp_t *ramp, uint32_t change, uint32_t mo
     uint8_t log2 = ramp->group_log2;
     ramp->group_log2 = 0;
     if (ticks > GROUP_MAX_TICKS / 2)
-        return (uint16_t)(1u << ramp->least_log2); /* often, near a standstill */
+        return 1; /* often, near a standstill */
     if (!ramp->faster) {
         ticks = (uint16_t)(ticks + (ticks >> part_log2(ramp))); /* they grow, and the variable shrinks */
         most_change -= most_change >> 2;
@@ -136,8 +136,6 @@ static NOINLINE uint16_t choose_group(ramp_t *ramp, uint32_t change, uint32_t mo
     uint16_t most_ticks = ramp->steep > 1 ? GROUP_MAX_STEEP_TICKS : GROUP_MAX_TICKS;
     while (log2 && (ticks > most_ticks >> log2 || change > most_change >> log2))
         log2--;
-    if (log2 < ramp->least_log2)
-        log2 = ramp->least_log2;
     uint16_t pulses = (uint16_t)(1u << log2);
     ramp->group_log2 = log2;
     if (ramp->rest && left <= pulses)
@@ -339,9 +337,9 @@ static uint16_t harmonic_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16)
     uint16_t pulses;
     ramp->bounded = v2 > cap2;
     if (ramp->bounded) {
-        uint32_t above = (ramp->v - ramp->limit.cap) / step + 1; /* so many pulses, rounded up to whole groups */
+        uint32_t above = (ramp->v - ramp->limit.cap) / step + 1; /* so many pulses */
         if (above < left)
-            left = (uint16_t)((above - 1u) | ((1u << ramp->least_log2) - 1u)) + 1u;
+            left = (uint16_t)above;
         pulses = choose_group(ramp, 0, 0, left);
         v2 = cap2;
     } else {
@@ -475,13 +473,13 @@ uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *group
             if (fits) {
                 wide_copy(&ramp->x, &x_end);
                 ramp->v = v_end;
-            } else if (pulses >> ramp->least_log2 > 1) {
+            } else if (pulses > 1) {
                 ramp->most_log2 = (uint8_t)(ramp->group_log2 - 1);
             } else {
                 /* All that is left: equal intervals, from this one on. */
                 ramp->most_log2 = GROUP_MAX_LOG2;
                 ramp->bounded = true;
-                few = (uint16_t)(1u << ramp->least_log2);
+                few = 1;
             }
         }
     } while (!fits);
