@@ -127,6 +127,12 @@ static uint16_t setup_ticks(void)
     return (uint16_t)(ticks_of_cycles((uint16_t)(DIR_SETUP_CYCLES + wait_us * TICKS_PER_US)) + engine.width_ticks);
 }
 
+/* A period at whose beginning dir or MS1 to MS3 are set, at least. */
+static NOINLINE uint16_t turn_ticks(void)
+{
+    return (uint16_t)(ticks_of_cycles(TURN_CYCLES) + 1 + engine.width_ticks);
+}
+
 static NOINLINE bool has_no_ramps(const motion_command_t *c)
 {
     NEAR(c);
@@ -253,13 +259,27 @@ static NOINLINE uint16_t pulses_left(void)
     return run_of(profile.accel_pulses + profile.cruise_pulses + profile.decel_pulses);
 }
 
+/* Those of them that are made in this gear: not the last one, which has the closing interval, and, where something is left
+ * at the end that is no whole pulse, those up to the last full step only. */
+static NOINLINE uint16_t pulses_in_gear(void)
+{
+    uint16_t pulse = (uint16_t)(1u << engine.gear);
+    uint16_t left = pulses_left();
+    if (left <= pulse)
+        return 0;
+    left = (uint16_t)(left - pulse);
+    if (left & (pulse - 1u))
+        left = (uint16_t)(left - ((left - to_full_step()) & ((1u << basis.factor_log2) - 1u)));
+    return left;
+}
+
 /* Those of them that come after the next `planned` ones and may be repeated if the ring runs empty. */
 static NOINLINE uint8_t pulses_to_come(uint16_t planned)
 {
-    uint16_t left = pulses_left();
+    uint16_t left = pulses_in_gear();
     if (left <= planned)
         return 0;
-    left = (uint16_t)((uint16_t)(left - planned - 1) >> engine.gear);
+    left = (uint16_t)((uint16_t)(left - planned) >> engine.gear);
     return (uint8_t)(left > 254 ? 254 : left);
 }
 
@@ -328,7 +348,8 @@ static void absorb_held(void)
     uint16_t held = (uint16_t)(pulses << gear_of(last));
     /* The cruise becomes shorter, or, where there is none, the ramps; the closing interval stays. */
     uint16_t left = pulses_left();
-    uint16_t given = left > held ? held : left ? (uint16_t)(left - 1) : 0;
+    uint16_t pulse = (uint16_t)(1u << engine.gear);
+    uint16_t given = left > held ? held : left > pulse ? (uint16_t)(left - pulse) : 0;
     engine.owed = (uint16_t)(engine.owed + held - given);
     take(&profile.decel_pulses, take(&profile.accel_pulses, take(&profile.cruise_pulses, given)));
 }
@@ -403,7 +424,7 @@ static void push(uint16_t periods, uint16_t ticks, bool pulse)
     }
     if (periods)
         append_run(periods, ticks, pulse, (uint8_t)(engine.ramp_state | direction_flags(&command, turn)));
-    if (pulse && step_hold < HOLD_LEAST)
+    if (pulse && !turn && step_hold < HOLD_LEAST) /* (a period before another gear is not one to be repeated in it) */
         allow_hold(pulses_to_come(0));
 }
 
@@ -561,15 +582,14 @@ static void emit_flat(uint16_t pulses, uint32_t ticks)
     }
 }
 
-/* The phase's pulses that may be emitted, so many of them in one run: the last one of all has the closing interval. */
+/* The phase's pulses that may be emitted, so many of them in one run. */
 static NOINLINE uint16_t pulses_of_phase(void)
 {
-    uint16_t pulse = (uint16_t)(1u << engine.gear);
-    uint16_t most = (uint16_t)(pulses_left() - pulse);
+    uint16_t most = pulses_in_gear();
     uint32_t left = *engine.phase_left;
     if (left < most)
         most = (uint16_t)left;
-    return most & (uint16_t)(0u - pulse);
+    return most & (uint16_t)(0u - (1u << engine.gear));
 }
 
 /* Appends what the ring has room for of the block. */
@@ -663,7 +683,16 @@ static NOINLINE uint16_t next_group(uint16_t at_most, ramp_time_t *sum)
     uint8_t gear = engine.gear;
     ramp.least_log2 = gear;
     ramp.split_ticks = gear ? (uint8_t)0 : basis.ramp.split_ticks;
+    uint8_t part = (uint8_t)((1u << gear) - 1u);
     uint16_t steps = ramp_next(&ramp, at_most, sum, &block);
+    while (steps & part) { /* steep: in less than a pulse the velocity changes by much */
+        ramp_time_t more;
+        steps = (uint16_t)(steps + ramp_next(&ramp, (uint8_t)(0u - steps) & part, &more, &block));
+        uint32_t frac = (uint32_t)sum->frac_q16 + more.frac_q16;
+        sum->frac_q16 = (uint16_t)frac;
+        sum->ticks += more.ticks + (frac >> 16);
+        block.runs = 0;
+    }
     uint16_t pulses = (uint16_t)(steps >> gear);
     if (pulses == 1)
         block.runs = 0;
@@ -701,8 +730,9 @@ static void begin_closing(uint32_t ticks)
     engine.stage = STAGE_TAIL;
 }
 
-/* The gear for the next pulse but one: so that pulses are not nearer than GEAR_CYCLES, and no part of a step is left. */
-static NOINLINE uint8_t wanted_gear(void)
+/* The gear for a pulse with which so much of the command is left: so that pulses are not nearer than GEAR_CYCLES, and no
+ * part of a step is left. */
+static NOINLINE uint8_t wanted_gear(uint16_t left)
 {
     uint16_t ticks = ramp.ticks;
     if (engine.ramp_state == MOTION_CRUISE)
@@ -710,7 +740,6 @@ static NOINLINE uint8_t wanted_gear(void)
     uint8_t gear = 0;
     for (; gear < basis.factor_log2 && ticks < ticks_of_cycles(GEAR_CYCLES); gear++)
         ticks = (uint16_t)(ticks << 1);
-    uint16_t left = (uint16_t)(pulses_left() - (1u << engine.gear));
     if (left >> basis.factor_log2 == 0) {
         while (left & ((1u << gear) - 1u))
             gear--;
@@ -724,19 +753,22 @@ static NOINLINE void emit_phase(void)
     uint16_t at_most = pulses_of_phase();
     uint16_t pulse = (uint16_t)(1u << engine.gear);
     uint8_t gear = engine.gear;
-    bool closing = at_most == 0;
+    bool closing = pulses_left() <= pulse;
     if (closing || engine.ahead_ticks || engine.owed >= pulse) {
         at_most = pulse;
     } else if (settings.auto_microstep) {
-        uint8_t wanted = wanted_gear();
+        uint8_t wanted = wanted_gear((uint16_t)(pulses_left() - pulse)); /* of the next pulse but one */
         if (wanted != gear) {
-            /* At a full step: the pulse after the next interval is the first one of it. */
+            /* At a full step: the pulse after the next interval is the first one of it. Nothing is held from here on, or it
+             * would not begin there. */
+            if (settle(0))
+                return;
             uint16_t way = to_full_step();
             if (way == 0) {
                 way = pulse;
                 gear = wanted;
             }
-            if (at_most > way)
+            if (at_most == 0 || at_most > way)
                 at_most = way;
         }
     }
@@ -760,6 +792,8 @@ static NOINLINE void emit_phase(void)
         if (gear != engine.gear) {
             set_gear(gear);
             engine.dir_due = true;
+            if (ticks < turn_ticks()) /* from within a step, at speed */
+                ticks = turn_ticks();
         }
         emit_flat(pulses, ticks);
     }
@@ -982,9 +1016,9 @@ static void choose_start_gear(void)
 {
     if (to_full_step() == 0) {
         choose_phase();
-        set_gear(wanted_gear());
+        set_gear(wanted_gear(pulses_left()));
         engine.ramp_state = MOTION_STANDBY;
-    } else if (command.flags & MOTION_PULSES || command.extra_pulses) {
+    } else if (!engine.endless && (command.flags & MOTION_PULSES || command.extra_pulses)) {
         set_gear(0); /* as it was stopped within a step, so it is within a step that the ratio changes */
     }
     step_port_microsteps(engine.gear_bits >> SEGMENT_MS_SHIFT);
@@ -1109,7 +1143,7 @@ static void join_next(void)
         if (waits) {
             flags = tail->flags;
         } else {
-            uint16_t least = (uint16_t)(ticks_of_cycles(TURN_CYCLES) + 1 + engine.width_ticks);
+            uint16_t least = turn_ticks();
             top = (uint16_t)(top + ticks_of_cycles((uint8_t)wait_us * TICKS_PER_US));
             if (turns && top < least)
                 top = least;
@@ -1252,7 +1286,8 @@ void engine_stop(void)
  * (it ends by itself now, or it stands in the middle of a wait or of an interval longer than that of slow speed). */
 static NOINLINE uint32_t cut(void)
 {
-    allow_hold(0);
+    settle(0);
+    engine.owed = 0;
     step_snapshot_t at = step_port_snapshot();
     uint8_t first = (uint8_t)(at.tail - SEGMENT_BYTES);
     uint8_t offset = first;

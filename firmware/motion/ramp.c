@@ -108,7 +108,7 @@ static NOINLINE uint16_t choose_group(ramp_t *ramp, uint16_t left)
     uint8_t log2 = ramp->group_log2;
     ramp->group_log2 = 0;
     if (ticks > GROUP_MAX_TICKS / 2)
-        return (uint16_t)(1u << ramp->least_log2); /* often, near a standstill */
+        return 1; /* often, near a standstill */
     uint32_t change = ramp->step;
     uint32_t most_change = ramp->v;
     if (ramp->linear) {
@@ -128,8 +128,6 @@ static NOINLINE uint16_t choose_group(ramp_t *ramp, uint16_t left)
     uint16_t most_ticks = ramp->steep > 1 ? GROUP_MAX_STEEP_TICKS : GROUP_MAX_TICKS;
     while (log2 && (ticks > most_ticks >> log2 || change > most_change >> log2))
         log2--;
-    if (log2 < ramp->least_log2)
-        log2 = ramp->least_log2;
     uint16_t pulses = (uint16_t)(1u << log2);
     ramp->group_log2 = log2;
     if (ramp->rest && left <= pulses)
@@ -459,13 +457,13 @@ uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *group
             if (!fits) {
                 wide_change(&ramp->x, &change, !ramp->faster);
                 ramp->v = wide_root(&ramp->x);
-                if (pulses >> ramp->least_log2 > 1) {
+                if (pulses > 1) {
                     ramp->most_log2 = (uint8_t)(ramp->group_log2 - 1);
                 } else {
                     /* All that is left: equal intervals, from this one on. */
                     ramp->most_log2 = GROUP_MAX_LOG2;
                     ramp->bounded = true;
-                    few = pulses;
+                    few = 1;
                 }
             }
         }
