@@ -275,20 +275,20 @@ static NOINLINE uint8_t pulses_to_come(uint16_t planned)
 }
 
 /* Clockwise positive. */
-static NOINLINE int32_t signed_pulses(uint8_t flags, uint16_t pulses)
+static NOINLINE int32_t signed_pulses(uint8_t flags, uint32_t pulses)
 {
     return flags & (1 << SEGMENT_CCW_BIT) ? -(int32_t)pulses : (int32_t)pulses;
 }
 
 static NOINLINE void add_pulses(uint8_t flags, uint16_t pulses)
 {
-    engine.emitted += signed_pulses(flags, pulses) << engine.gear;
+    engine.emitted += signed_pulses(flags, (uint32_t)pulses << engine.gear);
 }
 
 /* Of a segment, so many periods. */
 static NOINLINE int32_t pulses_of(const segment_t *s, uint16_t periods)
 {
-    return is_silent(s) ? 0 : signed_pulses(s->flags, periods) << gear_of(s);
+    return is_silent(s) ? 0 : signed_pulses(s->flags, (uint32_t)periods << gear_of(s));
 }
 
 /* Is the one-period segment at `offset` being played, or over? (It is loaded one period before it begins, and what comes
@@ -688,8 +688,8 @@ static NOINLINE uint16_t next_group(uint16_t at_most, ramp_time_t *sum)
         block.runs = 0;
     block.pulses = (uint8_t)(block.pulses >> gear);
     block.top_q16 = ((block.top_q16 + 65536u) << gear) - 65536u;
-    block.slope_q16 <<= gear;
-    block.curve_q16 <<= gear;
+    block.slope_q16 = (int32_t)((uint32_t)block.slope_q16 << gear);
+    block.curve_q16 = (int32_t)((uint32_t)block.curve_q16 << gear);
     int32_t adjust_q16 = engine.adjust_q16;
     if (adjust_q16) {
         block.top_q16 += (uint32_t)adjust_q16;
