@@ -698,11 +698,13 @@ static NOINLINE uint16_t next_group(uint16_t at_most, ramp_time_t *sum)
         block.runs = 0;
     block_t *b = &block;
     NEAR(b);
-    for (; gear; gear--) { /* from the smallest steps to pulses */
-        b->pulses >>= 1;
-        b->top_q16 = 2 * b->top_q16 + 65536u;
-        b->slope_q16 *= 2;
-        b->curve_q16 *= 2;
+    if (b->runs) {
+        for (; gear; gear--) { /* from the smallest steps to pulses */
+            b->pulses >>= 1;
+            b->top_q16 = 2 * b->top_q16 + 65536u;
+            b->slope_q16 *= 2;
+            b->curve_q16 *= 2;
+        }
     }
     int32_t adjust_q16 = engine.adjust_q16;
     if (adjust_q16) {
@@ -1263,6 +1265,7 @@ static void halt(void)
     if (!engine.playing)
         return;
     step_port_halt();
+    settle(0); /* what was repeated counts */
     if (running() && motion_state != MOTION_STANDBY)
         engine.played++;
     engine.ended = engine.begun;

@@ -692,7 +692,7 @@ static void test_pulses_are_not_joined_to_larger_steps(void)
     assert_position(1001 * 16, "pulses behind full steps");
 }
 
-/* MIC-012, CMD-013 */
+/* MIC-012 */
 static void test_single_pulses_are_of_the_smallest_steps_at_a_full_step(void)
 {
     power_on(true, A4988, 4);
