@@ -1080,6 +1080,22 @@ static void test_a_steep_linear_ramp_from_standstill_speeds_up_and_slows_down(vo
     TEST_ASSERT_EQUAL_UINT8(0, engine_faults());
 }
 
+/* STO-001 */
+static void test_a_stop_counts_what_was_repeated(void)
+{
+    unsigned repeated = 0;
+    for (uint32_t late = 100000; late < 5000000; late += 30011) {
+        setUp();
+        submit(move(4000, 3000, 10, 10));
+        run_for(8000000);
+        step_player_advance(late); /* nobody plans meanwhile */
+        repeated += step_held != 0;
+        engine_stop();
+        assert_position_is_right();
+    }
+    TEST_ASSERT_TRUE(repeated > 0);
+}
+
 static void test_no_motion_so_far_has_starved(void)
 {
     TEST_ASSERT_EQUAL_UINT8(0, engine_faults());
@@ -1170,6 +1186,7 @@ int main(void)
     RUN_TEST(test_a_planner_of_usual_speed_keeps_the_ring_filled);
     RUN_TEST(test_a_steep_linear_ramp_from_standstill_speeds_up_and_slows_down);
     RUN_TEST(test_no_motion_so_far_has_starved);
+    RUN_TEST(test_a_stop_counts_what_was_repeated);
     RUN_TEST(test_a_planner_that_is_too_slow_neither_adds_nor_loses_a_pulse);
     RUN_TEST(test_a_command_has_not_ended_where_the_planner_was_late);
     return UNITY_END();

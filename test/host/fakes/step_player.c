@@ -7,6 +7,7 @@
 #define LEAD_BEGIN 4
 #define FREEZE_TICKS 16
 #define SHORTEST_PERIOD 32
+#define HOLD_PERIODS 4 /* as in step_isr.S */
 #define EARLY SEGMENT_EARLY_MASK
 #define SET_DIR (1 << SEGMENT_SET_DIR_BIT)
 #define DIR (1 << SEGMENT_DIR_BIT)
@@ -150,14 +151,17 @@ static void ring_empty(void)
     uint8_t flags = step_flags;
     if (flags & SET_DIR)
         set_dir(p.begin + step_player_load_ticks, (flags & DIR) != 0);
-    step_flags = flags & (uint8_t)~(EARLY | SET_DIR);
-    p.to_count = (uint16_t)((flags & EARLY) >> SEGMENT_EARLY_SHIFT);
-    if (p.to_count)
+    step_flags = flags & (uint8_t)~SET_DIR;
+    uint8_t held = step_hold < HOLD_PERIODS ? step_hold : HOLD_PERIODS;
+    if (flags & EARLY && held < HOLD_PERIODS) { /* silence, when what is due has been played */
+        step_flags &= (uint8_t)~EARLY;
+        p.to_count = (uint16_t)((flags & EARLY) >> SEGMENT_EARLY_SHIFT);
         return;
-    if (step_hold) {
-        step_hold--;
-        step_held++;
-        p.to_count = 1;
+    }
+    if (held) {
+        step_hold = (uint8_t)(step_hold - held);
+        step_held = (uint8_t)(step_held + held);
+        p.to_count = held;
         return;
     }
     p.next_match = SEGMENT_SILENT;
@@ -491,7 +495,6 @@ void step_port_halt(void)
         if (p.clocked && p.risen)
             p.harm.cut_pulses++;
         stop_clock();
-        p.over = false;
         return;
     }
     if (p.ready) {
