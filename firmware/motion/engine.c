@@ -49,6 +49,7 @@ static struct {
     uint16_t width_ticks; /* of a pulse */
     uint8_t gear;         /* each pulse makes this power of two of the smallest steps, in which all that is planned counts */
     uint8_t running_gear; /* when the position was last looked at */
+    uint8_t origin;       /* a full step's position, modulo 256 */
     uint8_t gear_bits;    /* the same, and MS1 to MS3, as segments have them */
     int32_t adjust_q16;   /* each interval is longer by so many ticks: xclk - ihd */
     bool plain;           /* it is not, and a tick is a cycle */
@@ -169,22 +170,22 @@ static uint8_t gear_of(const segment_t *s)
 /* Smallest steps to the next full one. */
 static NOINLINE uint8_t to_full_step(void)
 {
-    uint8_t place = (uint8_t)engine.emitted;
+    uint8_t place = (uint8_t)((uint8_t)engine.emitted - engine.origin);
     if (!is_ccw(&command))
         place = (uint8_t)(0u - place);
     return place & (uint8_t)((1u << basis.factor_log2) - 1u);
 }
 
-/* In standstill at a full step: the lowest. */
+/* In standstill: the lowest, but within a step that of it is kept. */
 static NOINLINE void reset_gear(void)
 {
-    if (to_full_step() == 0)
-        set_gear(0);
+    set_gear(settings.auto_microstep && to_full_step() != 0 ? engine.gear : 0);
     step_port_microsteps(engine.gear_bits >> SEGMENT_MS_SHIFT);
 }
 
 void engine_init(void)
 {
+    uint8_t factor_log2 = basis.factor_log2;
     uint32_t clock_hz = settings.internal_clock ? TICKS_PER_US * 1000000u : settings.xclk_hz;
     profile_basis(&basis, settings.steps_per_rev, drivers_ustep(settings.driver_id, settings.ustep),
                   settings.slow_rpm, clock_hz);
@@ -204,6 +205,8 @@ void engine_init(void)
     engine.adjust_q16 = (int16_t)(settings.xclk_counts - settings.ihd_counts) * (int32_t)wide_half(&half_us_q20, 0) >> 4;
     engine.plain = settings.internal_clock && engine.adjust_q16 == 0;
     step_port_init();
+    if (basis.factor_log2 != factor_log2) /* as far as is known */
+        engine.origin = (uint8_t)engine.emitted;
     reset_gear();
 }
 

@@ -716,6 +716,24 @@ static void test_single_pulses_are_of_the_smallest_steps_at_a_full_step(void)
     assert_position(position + (position % 16 == 0 ? 3 : 8 + 2), "+++ behind a stop");
 }
 
+/* MIC-012: where the motor stands then is a full step, whatever the position says */
+static void test_another_ratio_begins_at_a_full_step(void)
+{
+    power_on(true, A4988, 0);
+    run_to("m7v100\r", 7);
+    image_send("$CD1\r$CJ4\r$R\r");
+    image_sent();
+    image_run(SECOND);
+    (void)image_take_text();
+    watch.ustep = 4;
+    watch.position = 0;
+    run("m200v1200a20d20\r");
+    assert_no_blame("after $R");
+    TEST_ASSERT_EQUAL(3200, watch.position);
+    TEST_ASSERT_TRUE(watch.changes > 0);
+    TEST_ASSERT_EQUAL(7 + 3200, image_position());
+}
+
 /* MIC-011 */
 static void test_without_auto_micro_nothing_changes(void)
 {
@@ -860,6 +878,7 @@ int main(void)
     RUN_TEST(test_counts_in_pulses_are_of_the_smallest_steps);
     RUN_TEST(test_pulses_are_not_joined_to_larger_steps);
     RUN_TEST(test_single_pulses_are_of_the_smallest_steps_at_a_full_step);
+    RUN_TEST(test_another_ratio_begins_at_a_full_step);
     RUN_TEST(test_without_auto_micro_nothing_changes);
     RUN_TEST(test_random_programs_keep_the_position);
     return UNITY_END();
