@@ -1200,7 +1200,7 @@ void engine_release(void)
     step_port_release();
 }
 
-NOINLINE bool engine_poll(void) /* (the benchmark measures it) */
+static NOINLINE bool play_on(void)
 {
     bool worked = false;
     look_for_end();
@@ -1241,6 +1241,12 @@ NOINLINE bool engine_poll(void) /* (the benchmark measures it) */
         } while (ring_free() > SEGMENT_COUNT / 2 * SEGMENT_BYTES && !step_idle && --rounds);
     }
     return worked;
+}
+
+NOINLINE bool engine_poll(void) /* (the benchmark measures it) */
+{
+    /* In standstill a line's end must not wait for all those registers to be saved. */
+    return (engine.playing || step_late) && play_on();
 }
 
 uint8_t engine_commands_ended(void)
