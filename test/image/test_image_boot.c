@@ -398,6 +398,22 @@ static void test_a_unit_that_hangs_again_and_again_is_there_in_between(void)
     TEST_ASSERT_EQUAL_UINT_MESSAGE(0, times_printed("?17"), "an external reset is none by the watchdog");
 }
 
+/* AUT-007 */
+static void test_the_position_does_not_outlast_a_loss_of_power(void)
+{
+    image_prompt();
+    image_do("m37v300");
+    image_idle(LONG_WAIT);
+    TEST_ASSERT_EQUAL(37, image_position());
+    image_do("qs");
+    image_run(SECOND);
+    image_off();
+    image_power_on();
+    image_prompt();
+    TEST_ASSERT_EQUAL(0, image_position());
+    image_assert_no_pulse_for(SECOND);
+}
+
 static void test_neither_sleep_nor_silence_nor_work_sets_the_watchdog_off(void)
 {
     image_prompt();
@@ -440,6 +456,7 @@ int main(void)
     RUN_TEST(test_a_hang_at_rest_is_reported);
     RUN_TEST(test_a_hang_in_the_window_is_reported);
     RUN_TEST(test_a_unit_that_hangs_again_and_again_is_there_in_between);
+    RUN_TEST(test_the_position_does_not_outlast_a_loss_of_power);
     RUN_TEST(test_neither_sleep_nor_silence_nor_work_sets_the_watchdog_off);
     return UNITY_END();
 }

@@ -336,7 +336,7 @@ static void test_500_values_at_38400_bd_are_all_taken_while_the_motor_runs_at_33
     set_500_values(38400);
 }
 
-/* CLK-013 */
+/* CLK-013, PER-005: a thousand lines, two to a value */
 static void test_500_values_at_250000_bd_are_all_taken_while_the_motor_runs_at_33_khz(void)
 {
     srand(43);
