@@ -53,7 +53,7 @@ static NOINLINE void since(uint32_t *us)
     *us = timebase_us() - *us;
 }
 
-/* Each at most TEXT_PIECE_BYTES long. */
+/* At most TEXT_ERROR_BYTES. */
 static void put_error(struct terminal *t)
 {
     terminal_port_put('?');
@@ -68,6 +68,7 @@ static void put_error(struct terminal *t)
     t->owed_status = STATUS_OK;
 }
 
+/* At most TEXT_PIECE_BYTES. */
 static void put_times(struct terminal *t)
 {
     const char *words = FLASH_TEXT(", loaded ");
@@ -99,6 +100,9 @@ static NOINLINE uint8_t pay(void)
     } else if (t->owes_times != 0) {
         put_times(t);
     } else if (t->owed_status != STATUS_OK) {
+        if (terminal_port_free() < TEXT_ERROR_BYTES) {
+            return 0;
+        }
         put_error(t);
     } else {
         text_put_flash(commands_prompt());

@@ -8,6 +8,7 @@
 
 /* What is put at a time is no longer than this: whoever has room for so many may go on. */
 #define TEXT_PIECE_BYTES 24
+#define TEXT_ERROR_BYTES 28 /* but an error with its range */
 
 /* A character of a text in flash: it may stand for up to TEXT_LONGEST (tools/pack_texts.py). Returns how many were put. */
 #define TEXT_LONGEST 4
