@@ -3,9 +3,9 @@
  * Cycles, interrupt entry (4) and the jump in the vector table (3) included:
  *   period counted                      23
  *   period counted, low byte wrapped    30
- *   segment loaded                      90, with a change of dir 101
+ *   segment loaded                      90, with a change of dir or gear 123
  *   segment loaded one to three periods early, waits included: at most 160
- *   ring empty                          88
+ *   ring empty                          86
  * (measured: make bench BENCH=isr)
  *
  * It is the only interrupt that is never interrupted: SREG rests in GPIOR2, the counter in GPIOR0 (low) and GPIOR1.

@@ -3,7 +3,7 @@
  *
  * Purpose: the planner works out a group of many pulses at once; played flat, they would differ from the law by half of
  *          what the law changes in the group. A block turns the group into shorter runs that follow it.
- * Units:   ticks of 62.5 ns in 1/65536; a run has 1, 2, 4, ... 128 pulses.
+ * Units:   ticks of the timer's clock in 1/65536; a run has 1, 2, 4, ... 128 pulses.
  * Context: main loop only. In assembler on the AVR (block.S, cycles there), elsewhere in block.c.
  * Errors:  none.
  * Source:  docs/design.md, "Blocks".

@@ -48,9 +48,9 @@ typedef enum {
 static struct {
     uint16_t width_ticks; /* of a pulse */
     uint8_t gear;         /* each pulse makes this power of two of the smallest steps, in which all that is planned counts */
-    uint8_t running_gear; /* when the position was last looked at */
-    uint8_t origin;       /* a full step's position, modulo 256 */
     uint8_t gear_bits;    /* the same, and MS1 to MS3, as segments have them */
+    uint8_t running_gear; /* of the pulse being played when the position was last looked at */
+    uint8_t origin;       /* a full step's position, modulo 256 */
     int32_t adjust_q16;   /* each interval is longer by so many ticks: xclk - ihd */
     bool plain;           /* it is not, and a tick is a cycle */
     const motion_command_t *next; /* offered, not begun; null: nothing */
@@ -109,6 +109,7 @@ static NOINLINE uint16_t ticks_of_cycles(uint16_t cycles)
     return (uint16_t)(cycles >> basis.ramp.cycles_log2);
 }
 
+/* Whole microseconds of so many PROFILE_CHUNK_TICKS and ticks. */
 static uint32_t us_of(uint32_t chunks, uint32_t ticks)
 {
     if (basis.ramp.cycles_log2 == 0)
@@ -205,7 +206,7 @@ void engine_init(void)
     engine.adjust_q16 = (int16_t)(settings.xclk_counts - settings.ihd_counts) * (int32_t)wide_half(&half_us_q20, 0) >> 4;
     engine.plain = settings.internal_clock && engine.adjust_q16 == 0;
     step_port_init();
-    if (basis.factor_log2 != factor_log2) /* as far as is known */
+    if (basis.factor_log2 != factor_log2) /* a position in other steps says nothing: the motor is taken to stand at a full one */
         engine.origin = (uint8_t)engine.emitted;
     reset_gear();
 }
@@ -1130,6 +1131,8 @@ static void join_next(void)
         needed = JOIN_FLAT_CYCLES;
     else if (next->flags & MOTION_LINEAR)
         needed = JOIN_LINEAR_CYCLES;
+    if (ticks > JOIN_SOON_CYCLES) /* (of ticks, which are no shorter: the shift below has room) */
+        return;
     ticks <<= basis.ramp.cycles_log2;
     if (ticks > JOIN_SOON_CYCLES || ticks < needed)
         return; /* later, or after its end */

@@ -1,7 +1,7 @@
 /* Profiles: a motion command turned into acceleration, cruise and deceleration.
  *
  * Purpose: how many pulses each phase has, where each begins, and what velocity stays in play at the end.
- * Units:   pulses; velocities in RPM * 100 * microstep factor ("units", see ramp.h); intervals in ticks of 62.5 ns.
+ * Units:   pulses; velocities in RPM * 100 * microstep factor ("units", see ramp.h); intervals in ticks of the timer's clock.
  * Context: main loop; pure arithmetic. Tests: test/host/test_profile.c, test/avr/.
  * Source:  manual lines 85-107, 249-269 (ramp lengths, truncation), 159, 792 (slow speed), 165-169 (transitions),
  *          543-547 (velocity and cycle), 1005-1015 (microsteps).

@@ -5,8 +5,9 @@
  *          those of the law, so a ramp has no drift.
  * Laws:    harmonic: interval = K / v, v changing by a constant amount per pulse (manual lines 77-89);
  *          linear: v^2 changing by a constant amount per pulse (constant acceleration; manual lines 101-115, 265).
- * Units:   ticks of the timer's clock (62.5 ns, or the external one's) with a fraction in 1/65536. Velocities in "units" = RPM * 100 * microstep factor, so that a
- *          ramp value in hundredths is the change per pulse whatever the factor, and interval = K / v.
+ * Units:   ticks of the timer's clock (62.5 ns, or the external one's) with a fraction in 1/65536. Velocities in "units" =
+ *          RPM * 100 * microstep factor, so that a ramp value in hundredths is the change per pulse whatever the factor, and
+ *          interval = K / v.
  * Context: main loop only; no hardware. Tests: test/host/test_ramp.c, test/avr/.
  * Errors:  none; what is asked for has been checked (profile_check).
  * Limits:  steps_per_rev * slow_rpm >= 58 and steps_per_rev >= 8 (first intervals below about one second).

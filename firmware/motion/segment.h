@@ -10,7 +10,7 @@
  * itself. The interrupt loads a segment at the beginning of the last period of the one before it: the segment at
  * step_tail - 8 is loaded, and is playing once one of its periods has been counted.
  *
- * Units:   ticks of Timer1 (62.5 ns).
+ * Units:   ticks of Timer1 (62.5 ns, or those of the external clock).
  * Context: named at each variable.
  * Source:  datasheet DS40002061 section 16.9.3 (fast PWM), docs/design.md. */
 #ifndef MOTION_SEGMENT_H
