@@ -48,9 +48,9 @@ typedef enum {
 static struct {
     uint16_t width_ticks; /* of a pulse */
     uint8_t gear;         /* each pulse makes this power of two of the smallest steps, in which all that is planned counts */
-    uint8_t gear_bits;    /* the same, and MS1 to MS3, as segments have them */
     uint8_t running_gear; /* of the pulse being played when the position was last looked at */
     uint8_t origin;       /* a full step's position, modulo 256 */
+    uint8_t gear_bits;    /* the gear, and MS1 to MS3, as segments have them */
     int32_t adjust_q16;   /* each interval is longer by so many ticks: xclk - ihd */
     bool plain;           /* it is not, and a tick is a cycle */
     const motion_command_t *next; /* offered, not begun; null: nothing */
@@ -1131,8 +1131,6 @@ static void join_next(void)
         needed = JOIN_FLAT_CYCLES;
     else if (next->flags & MOTION_LINEAR)
         needed = JOIN_LINEAR_CYCLES;
-    if (ticks > JOIN_SOON_CYCLES) /* (of ticks, which are no shorter: the shift below has room) */
-        return;
     ticks <<= basis.ramp.cycles_log2;
     if (ticks > JOIN_SOON_CYCLES || ticks < needed)
         return; /* later, or after its end */
