@@ -63,6 +63,9 @@ FIRMWARE_SRCS := \
     firmware/hal/reset.c \
     firmware/hal/timebase.c \
     firmware/hal/usart.c \
+    firmware/net/packet.c \
+    firmware/net/bus.c \
+    firmware/cli/network.c \
     firmware/cli/line.c \
     firmware/cli/terminal.c \
     firmware/cli/trial.c \

@@ -5,6 +5,7 @@
 #include "boot.h"
 #include "boot_port.h"
 #include "cli/commands.h"
+#include "cli/network.h"
 #include "cli/terminal.h"
 #include "cli/terminal_port.h"
 #include "cli/timebase_port.h"
@@ -57,6 +58,7 @@ __attribute__((OS_main, section(".init9"))) int main(void)
     boot_init();
     boot_start();
     terminal_init(boot_cause() != STATUS_OK ? boot_cause() : snapshot == STATUS_SNAPSHOT ? snapshot : STATUS_OK);
+    network_init();
     timebase_start();
     encoder_init();
     atomic_enable();
@@ -77,6 +79,7 @@ __attribute__((OS_main, section(".init9"))) int main(void)
                 }
             }
             worked = terminal_poll(); /* first: a line's end is what wakes a unit at rest, and its motion is awaited */
+            worked |= network_poll();
         }
         if (trial_failed()) {
             ports_init();

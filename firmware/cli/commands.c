@@ -6,14 +6,17 @@
 #include "cli/configure.h"
 #include "cli/display.h"
 #include "cli/motion_syntax.h"
+#include "cli/network.h"
 #include "cli/range.h"
 #include "cli/terminal_port.h"
 #include "cli/trial.h"
 #include "eeprom/store.h"
 #include "motion/engine.h"
+#include "net/bus.h"
 #include "queue/encoder.h"
 #include "queue/queue.h"
 #include "queue/session.h"
+#include "settings.h"
 
 typedef status_t (*handler_t)(const char *rest);
 
@@ -31,13 +34,18 @@ typedef struct {
 } command_row_t;
 
 static bool debugging;
+static bool remote;  /* the line came from the network */
+static bool restart; /* $R did */
 
 /* What a line is read as. */
-static enum { /* in the order of the prompts */
-    MODE_COMMANDS, MODE_QUEUE,
+enum { /* in the order of the prompts */
+    MODE_COMMANDS,
+    MODE_QUEUE,
     MODE_ARRAY,
     MODE_CONFIGURE
-} mode;
+};
+static uint8_t mode;
+static uint8_t other_mode; /* of the network's lines; while one is executed, the terminal's */
 
 /* The motion command, or single value, being read ahead: how many characters of the line it has seen, 0 for none. */
 static motion_syntax_t ahead;
@@ -259,6 +267,13 @@ static status_t command_save(const char *rest)
     return STATUS_OK;
 }
 
+static status_t command_clear_counters(const char *rest)
+{
+    (void)rest;
+    bus_clear();
+    return STATUS_OK;
+}
+
 static status_t command_restore(const char *rest)
 {
     (void)rest;
@@ -375,6 +390,13 @@ static status_t command_encoder(const char *rest)
     return STATUS_OK;
 }
 
+void commands_restart(void)
+{
+    restart = false;
+    trial_begin(store_load_settings());
+    boot_restart();
+}
+
 /* $R: the settings as they are stored, when all that is being written and sent is out. */
 static status_t command_reset(const char *rest)
 {
@@ -382,8 +404,10 @@ static status_t command_reset(const char *rest)
     if (store_busy() || !terminal_port_idle()) {
         return STATUS_WAIT;
     }
-    trial_begin(store_load_settings());
-    boot_restart();
+    restart = true;
+    if (!remote) {
+        commands_restart();
+    }
     return STATUS_OK;
 }
 
@@ -445,6 +469,7 @@ void commands_init(void)
     session_init();
     debugging = false; /* (a warm boot comes here too) */
     mode = MODE_COMMANDS;
+    other_mode = MODE_COMMANDS;
     AT_BOOT_ZERO(characters_ahead);
 }
 
@@ -486,17 +511,44 @@ static status_t execute_by_table(const char *line)
             return mode == MODE_QUEUE ? command_edit(line) : program_array(line);
         }
     }
-    if ((uint8_t)(line[0] - '0') <= 9) {
-        return STATUS_NOT_YET; /* a network address: TRM-006 */
-    }
     if (line[0] == '$') {
         queue_stop();
     }
     return dispatch(line);
 }
 
+/* Which node a line is for, and where its text begins. */
+static status_t read_address(const char *line, uint8_t *node)
+{
+    ahead.behind = line + 1;
+    *node = network_last_origin();
+    if ((uint8_t)(line[0] - '0') <= 9) {
+        const status_t status = read_number(line, RANGE_BYTE);
+        *node = number_8();
+        if (status != STATUS_OK) {
+            return status;
+        }
+    } else if (*node == 0) {
+        return STATUS_NOBODY;
+    }
+    return *ahead.behind == '\0' ? STATUS_SYNTAX : STATUS_OK;
+}
+
 NOINLINE status_t commands_execute(const char *line, uint8_t length)
 {
+    /* A digit, / or \ in front: a line for another node. (Between / and the digits there is nothing.) */
+    if (mode == MODE_COMMANDS && ((uint8_t)(line[0] - '/') <= 10 || line[0] == '\\')) {
+        uint8_t node;
+        const status_t status = remote ? STATUS_SYNTAX : read_address(line, &node);
+        if (status != STATUS_OK) {
+            return status;
+        }
+        if (node != settings.device_id) {
+            return network_send(node, ahead.behind);
+        }
+        length = (uint8_t)(length - (ahead.behind - line));
+        line = ahead.behind;
+    }
     commands_read_ahead(line, length);
     const uint8_t characters = characters_ahead;
     characters_ahead = 0;
@@ -519,6 +571,37 @@ bool commands_at_once(char character)
 const char *commands_prompt(void)
 {
     return flash_text(FLASH_TEXT("SAC>\0Q>\0X>\0SAC>"), mode);
+}
+
+static void exchange_modes(void)
+{
+    const uint8_t its_mode = mode;
+    mode = other_mode;
+    other_mode = its_mode;
+    remote = !remote;
+}
+
+status_t commands_execute_remote(const char *line)
+{
+    uint8_t length = 0;
+    while (line[length] != '\0') {
+        length++;
+    }
+    exchange_modes();
+    characters_ahead = 0; /* what is being typed will be read again */
+    const status_t status = commands_execute(line, length);
+    exchange_modes();
+    return status;
+}
+
+bool commands_remote(void)
+{
+    return remote;
+}
+
+bool commands_restart_due(void)
+{
+    return restart;
 }
 
 bool commands_debugging(void)

@@ -31,4 +31,13 @@ const char *commands_prompt(void); /* in flash: that of the mode */
 
 bool commands_debugging(void);
 
+/* -- from the network ---------------------------------------------------------------------------------------------- */
+
+/* Executes a line that came in a packet: it has a program mode of its own, displays nothing, and cannot be sent on. $R is
+ * accepted and left to be done: commands_restart() when the answer is out. */
+status_t commands_execute_remote(const char *line);
+bool commands_remote(void); /* such a line is being executed */
+bool commands_restart_due(void);
+void commands_restart(void);
+
 #endif

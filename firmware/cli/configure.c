@@ -159,17 +159,10 @@ static void put_value(uint8_t kind, uint8_t offset, uint32_t value)
     }
 }
 
-static NOINLINE void put_hex_digit(uint8_t digit)
-{
-    terminal_port_put((uint8_t)(digit + (digit < 10 ? '0' : 'A' - 10)));
-}
-
 /* A byte of the EEPROM, sixteen a line. */
 static void put_byte(uint16_t address)
 {
-    const uint8_t byte = eeprom_port_read(address);
-    put_hex_digit(byte >> 4);
-    put_hex_digit(byte & 0x0F);
+    text_put_hex(eeprom_port_read(address));
     if ((uint8_t)(address + 1) % 16 == 0) {
         text_new_line();
     } else {

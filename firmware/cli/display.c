@@ -8,6 +8,8 @@
 #include "cli/text.h"
 #include "eeprom/store.h"
 #include "motion/engine.h"
+#include "net/bus.h"
+#include "net/bus_port.h"
 #include "queue/encoder.h"
 #include "queue/queue.h"
 #include "queue/session.h"
@@ -57,6 +59,7 @@ _Static_assert(((SHOWN_GAP | SHOWN_DEBUG) & (SESSION_SOFT_OPS | SESSION_CRC | SE
 #define ENTRY "\031"
 #define SETTING_CELL "\032"
 #define OPS "\033"
+#define COUNTER "\034" /* of the network: one after the other */
 enum {
     FIELD_COUNT = 013,
     FIELD_RPM,
@@ -75,6 +78,7 @@ enum {
     FIELD_ENTRY,
     FIELD_SETTING_CELL,
     FIELD_OPS,
+    FIELD_COUNTER,
     FIELDS_END,
 };
 
@@ -112,7 +116,7 @@ enum { RULE_CHARACTERS = 70 };
 /* What each display begins with. */
 static const char *const texts[] FLASH = {
     [DISPLAY_QUEUE] = queue_head,       [DISPLAY_DEFAULTS] = defaults_text, [DISPLAY_VELOCITY] = velocity_text,
-    [DISPLAY_POSITION] = position_text, [DISPLAY_HELP] = commands_help,
+    [DISPLAY_POSITION] = position_text, [DISPLAY_HELP] = commands_help,     [DISPLAY_NETWORK] = network_text,
     [DISPLAY_ARRAY] = array_text,       [DISPLAY_CONFIGURE] = configure_text, [DISPLAY_EEPROM] = cell_text,
 };
 
@@ -124,6 +128,16 @@ void display_put_accel(accel_code_t code)
         text_put_decimal(code, 2);
     } else {
         text_put_u32(code - (ACCEL_CODE_WHOLE - 100u));
+    }
+}
+
+/* In the order of the text: bus_counters_t, and those of the port. */
+static uint16_t counter(uint8_t which)
+{
+    switch (which) {
+    case 4: return bus_port_framing_errors();
+    case 5: return bus_port_overruns();
+    default: return (&bus_counters.good)[which];
     }
 }
 
@@ -155,6 +169,7 @@ static void print_field(uint8_t field, const motion_command_t *command)
             number = 0u - number;
         }
         break;
+    case FIELD_COUNTER: number = counter(shown.row++); break;
     case FIELD_OPS: number = settings.ops_mask; break;
     case FIELD_SETTING_CELL: configure_put_cell(); return;
     case FIELD_STATE: text_put_flash(flash_text(state_words, engine_state())); return;
@@ -292,6 +307,9 @@ void display_init(void)
 status_t display_request(display_t display)
 {
     struct shown *const s = self();
+    if (commands_remote()) {
+        return STATUS_OK; /* full screens are the terminal's (manual line 181) */
+    }
     if (s->text == 0) {
         begin(display);
         return STATUS_OK;

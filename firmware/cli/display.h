@@ -1,6 +1,6 @@
 /* The displays: tables and lists, printed piece by piece as the port takes them, so that nothing waits for the line.
  *
- * A display that is asked for while another is printed waits for its turn; up to DISPLAY_WAITING can wait. What a
+ * Nothing is displayed for a line from the network. A display that is asked for while another is printed waits for its turn; up to DISPLAY_WAITING can wait. What a
  * display shows of the session and the time is that of the moment it begins; the queue is read row by row.
  * Every row ends with CR LF; the prompt is the terminal's business.
  * Context: main loop. Cost: one piece, at most 24 characters, each call.
@@ -22,6 +22,7 @@ typedef enum {
     DISPLAY_POSITION, /* p */
     DISPLAY_HELP,     /* ? */
     DISPLAY_ARRAY,    /* xd */
+    DISPLAY_NETWORK,  /* cn */
     DISPLAY_CONFIGURE, /* $C, cc; from here on: what is stored, when nothing is being written */
     DISPLAY_EEPROM,    /* $E */
     DISPLAY_ROW = 32, /* and a position: one row of the queue */

@@ -6,6 +6,7 @@
 #include "cli/display.h"
 #include "cli/line.h"
 #include "cli/motion_syntax.h"
+#include "cli/network.h"
 #include "cli/range.h"
 #include "cli/terminal_port.h"
 #include "cli/text.h"
@@ -53,19 +54,16 @@ static NOINLINE void since(uint32_t *us)
     *us = timebase_us() - *us;
 }
 
-/* At most TEXT_ERROR_BYTES. */
-static void put_error(struct terminal *t)
+NOINLINE void terminal_put_error(status_t status, uint8_t range)
 {
-    terminal_port_put('?');
-    text_put_u32(t->owed_status);
-    terminal_port_put(' ');
-    text_put_flash(status_words(t->owed_status));
-    if (t->owed_status == STATUS_RANGE) {
-        terminal_port_put(' ');
-        text_put_flash(range_text(t->owed_range));
+    text_put('?');
+    text_put_u32(status);
+    text_put(' ');
+    text_put_flash(status_words(status));
+    if (status == STATUS_RANGE) {
+        text_put(' ');
+        text_put_flash(range_text(range));
     }
-    text_new_line();
-    t->owed_status = STATUS_OK;
 }
 
 /* At most TEXT_PIECE_BYTES. */
@@ -95,7 +93,7 @@ static NOINLINE uint8_t pay(void)
     if (t->owes_new_line) {
         t->owes_new_line = false;
         text_new_line();
-    } else if (display_poll()) {
+    } else if (display_poll() || network_show()) {
         /* a piece of it */
     } else if (t->owes_times != 0) {
         put_times(t);
@@ -103,7 +101,9 @@ static NOINLINE uint8_t pay(void)
         if (terminal_port_free() < TEXT_ERROR_BYTES) {
             return 0;
         }
-        put_error(t);
+        terminal_put_error(t->owed_status, t->owed_range);
+        text_new_line();
+        t->owed_status = STATUS_OK;
     } else {
         text_put_flash(commands_prompt());
         t->behind = false;
@@ -129,6 +129,11 @@ void terminal_report(status_t status)
 {
     terminal.owed_status = status; /* before any other error */
     owe(&terminal, status);
+}
+
+void terminal_announce(void)
+{
+    owe(&terminal, STATUS_OK);
 }
 
 /* Brings the screen to what the line is, as far as the port has room. */

@@ -20,6 +20,11 @@ void terminal_init(status_t reported);
 
 void terminal_report(status_t status); /* is printed, as the answer to a line, and another prompt */
 
+void terminal_announce(void); /* something is to be shown (network_show()), and another prompt */
+
+/* `?12 range 1..255`, where text goes (text.h): at most TEXT_ERROR_BYTES, less two for a new line. */
+void terminal_put_error(status_t status, uint8_t range);
+
 uint8_t terminal_poll(void); /* takes a few bytes in, sends what is owed; not 0 if it did anything */
 
 #endif

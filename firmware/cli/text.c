@@ -4,6 +4,17 @@
 #include "base/number.h"
 #include "cli/terminal_port.h"
 
+uint8_t *text_to;
+
+static NOINLINE void out(uint8_t c)
+{
+    if (text_to != 0) {
+        *text_to++ = c;
+    } else {
+        terminal_port_put(c);
+    }
+}
+
 /* What characters from 0x80 on stand for: a character, and one that may be such a pair again. */
 static const uint8_t pairs[][2] FLASH = {
 #define PAIR(first, second) {first, second},
@@ -16,10 +27,10 @@ NOINLINE uint8_t text_put(uint8_t c)
     uint8_t count = 1;
     for (; c >= 0x80; count++) {
         const uint8_t *pair = pairs[0] + (uint8_t)(c << 1);
-        terminal_port_put(flash_u8(pair));
+        out(flash_u8(pair));
         c = flash_u8(pair + 1);
     }
-    terminal_port_put(c);
+    out(c);
     return count;
 }
 
@@ -36,13 +47,24 @@ void text_put_decimal(uint32_t value, uint8_t decimals)
 {
     char text[NUMBER_TEXT_BYTES];
     for (const char *c = number_format(text, value, decimals); *c != '\0'; c++) {
-        terminal_port_put((uint8_t)*c);
+        out((uint8_t)*c);
     }
 }
 
 NOINLINE void text_put_u32(uint32_t value)
 {
     text_put_decimal(value, 0);
+}
+
+static NOINLINE void put_hex_digit(uint8_t digit)
+{
+    terminal_port_put((uint8_t)(digit + (digit < 10 ? '0' : 'A' - 10)));
+}
+
+void text_put_hex(uint8_t byte)
+{
+    put_hex_digit(byte >> 4);
+    put_hex_digit(byte & 0x0F);
 }
 
 void text_new_line(void)

@@ -9,6 +9,7 @@
 
 void timebase_start(void); /* once, at boot */
 uint32_t timebase_us(void);
+uint16_t timebase_128us(void); /* units of 128 us, modulo 65,536: 8.4 s */
 uint8_t timebase_32ms(void);  /* units of 32.768 ms, modulo 256 */
 uint8_t timebase_262ms(void); /* units of 262.144 ms, modulo 256 */
 

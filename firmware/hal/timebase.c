@@ -14,6 +14,11 @@ void timebase_start(void)
     TCCR0B = _BV(CS01) | _BV(CS00);
 }
 
+uint16_t timebase_128us(void)
+{
+    return (uint16_t)timebase_overflows;
+}
+
 uint8_t timebase_32ms(void)
 {
     uint8_t state = atomic_begin();

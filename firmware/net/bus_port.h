@@ -1,7 +1,7 @@
 /* The serial port that the network uses, and the RS485 driver's enable pin (Tx En); implemented by hal/ports.c.
  *
  * Which port it is follows from the setting E network: 0 the software port (D4, D6), 1 the hardware port.
- * Units:   bytes, us. Context: main loop.
+ * Units:   bytes. Context: main loop.
  * Errors:  a byte with a framing error, or bytes lost before one, are read as a byte 0xFF and counted; a packet's CRC
  *          tells them from a genuine one.
  * Tests:   test/host/fakes/bus_port_fake.c stands in for it; test/image/test_image_bus.c
@@ -26,8 +26,8 @@ void bus_port_end(void);
 /* Tx En is high. What arrives meanwhile may be the port's own echo. */
 bool bus_port_sending(void);
 
-/* How long a character lasts, 10 bits, rounded up: 260 at 38,400 Bd. */
-uint16_t bus_port_character_us(void);
+/* How long so many characters of 10 bits last, in units of 128 us, rounded up: 3 for one at 38,400 Bd. */
+uint16_t bus_port_characters_128us(uint8_t characters);
 
 /* Of the network's port since bus_port_clear(); they stay at 255. */
 uint8_t bus_port_framing_errors(void);

@@ -1,5 +1,6 @@
 #include "queue/ops.h"
 #include "motion/engine.h"
+#include "net/bus.h"
 #include "queue/ops_port.h"
 #include "queue/session.h"
 #include "settings.h"
@@ -14,7 +15,9 @@ static void signal(bool executing)
         ops_port_set(executing);
     }
     if (session.options & SESSION_SOFT_OPS) {
-        ops_port_send(executing ? OPS_BEGIN : OPS_END);
+        const uint8_t byte = executing ? OPS_BEGIN : OPS_END;
+        ops_port_send(byte);
+        bus_ops(byte);
     }
 }
 

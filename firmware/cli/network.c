@@ -1,0 +1,341 @@
+#include "cli/network.h"
+#include "base/flash.h"
+#include "base/inline.h"
+#include "base/zeroed.h"
+#include "cli/commands.h"
+#include "cli/display.h"
+#include "cli/range.h"
+#include "cli/terminal.h"
+#include "cli/terminal_port.h"
+#include "cli/text.h"
+#include "cli/timebase_port.h"
+#include "cli/trial.h"
+#include "net/bus.h"
+#include "net/bus_port.h"
+#include "queue/session.h"
+#include "settings.h"
+
+/* Sequence bytes of strict packets: 0x80..0xFF. */
+#define SEQUENCE 0x80u
+
+/* The answer to a command, and in strict mode what is remembered of it. */
+typedef struct {
+    uint8_t origin; /* of the command; 0: nobody */
+    uint8_t sequence;
+    status_t status;
+    uint8_t range; /* of STATUS_RANGE */
+} answer_t;
+
+enum { ORIGINS = 4 };
+static answer_t answers[ORIGINS]; /* the last one first */
+static bool owed;                 /* answers[0] is to be sent */
+
+static uint8_t last_origin;
+
+/* What has been asked. */
+static enum { FREE, GREETING, ASKING, FAILED } asked; /* GREETING: a sequence alone; FAILED: that had no answer */
+static uint8_t asked_node, sequence;
+static uint16_t asked_128us;
+static uint8_t greeted; /* the node that the last sequence went to */
+
+/* What is still to be shown, in bus_packet or in brief; 0: nothing. */
+static const uint8_t *shown;
+static bool begun;
+static uint8_t brief[2]; /* an answer that is a single byte need not stay in bus_packet */
+
+void network_init(void)
+{
+    AT_BOOT_ZERO(answers);
+    AT_BOOT_ZERO(owed);
+    AT_BOOT_ZERO(last_origin);
+    AT_BOOT_ZERO(asked);
+    AT_BOOT_ZERO(shown);
+    AT_BOOT_ZERO(greeted);
+    greeted = settings.device_id; /* nobody yet */
+    bus_init();
+}
+
+uint8_t network_last_origin(void)
+{
+    return last_origin;
+}
+
+/* -- sending ---------------------------------------------------------------------------------------------------------- */
+
+/* The body begins; returns where it goes on. */
+static uint8_t *begin_body(uint8_t its_sequence)
+{
+    uint8_t *end = bus_packet.body;
+    if (bus_strict()) {
+        *end++ = its_sequence;
+    }
+    return end;
+}
+
+static NOINLINE void send(uint8_t destination, const uint8_t *end)
+{
+    bus_packet.length = (uint8_t)(end - bus_packet.body);
+    bus_send(destination, session.options & SESSION_CRC);
+}
+
+static uint8_t next_sequence(void)
+{
+    sequence = (uint8_t)((uint8_t)(sequence + 1u) | SEQUENCE);
+    return sequence;
+}
+
+static void send_answer(void)
+{
+    owed = false;
+    const answer_t *answer = answers;
+    uint8_t *end = begin_body(answer->sequence);
+    *end = PACKET_ACK;
+    if (answer->status != STATUS_OK) {
+        *end = PACKET_NAK;
+    }
+    end++;
+    if (bus_strict() && answer->status != STATUS_OK) {
+        text_to = end;
+        terminal_put_error(answer->status, answer->range);
+        end = text_to;
+        text_to = 0;
+    }
+    send(answer->origin, end);
+}
+
+static void ask(uint8_t what, uint8_t node)
+{
+    asked = what;
+    asked_node = node;
+    asked_128us = timebase_128us();
+}
+
+status_t network_send(uint8_t destination, const char *text)
+{
+    if (asked == FAILED) {
+        asked = FREE;
+        return STATUS_NO_ANSWER;
+    }
+    if (asked != FREE || owed || shown != 0 || !bus_free(timebase_128us(), BUS_PACKET_CHARACTERS)) {
+        return STATUS_WAIT;
+    }
+    uint8_t *end = begin_body(next_sequence());
+    /* The receiver must not take a command for a repeat: it hears a sequence first, whenever another one was spoken to. */
+    if (bus_strict() && destination != greeted) {
+        greeted = destination;
+        if (destination != PACKET_EVERYBODY) {
+            ask(GREETING, destination);
+        }
+        send(destination, end);
+        return STATUS_WAIT;
+    }
+    while (*text != '\0') {
+        *end++ = (uint8_t)*text++;
+    }
+    if (destination != PACKET_EVERYBODY) {
+        ask(ASKING, destination);
+    }
+    send(destination, end);
+    return STATUS_OK;
+}
+
+/* -- receiving -------------------------------------------------------------------------------------------------------- */
+
+static void show(const uint8_t *text)
+{
+    shown = text;
+    begun = false;
+    terminal_announce();
+}
+
+/* An answer to what has been asked. */
+static void take_answer(const uint8_t *body, uint8_t its_sequence)
+{
+    if (bus_packet.origin != asked_node || (bus_strict() && its_sequence != sequence)) {
+        return;
+    }
+    if (asked == ASKING) {
+        asked = FREE;
+        if (body[1] == '\0') {
+            brief[0] = *body;
+            body = brief;
+        }
+        show(body);
+    } else if (asked == GREETING) {
+        asked = FREE; /* whatever it is: the sequence has been heard */
+    }
+}
+
+static status_t execute(const uint8_t *body)
+{
+    if (*body == ' ' || *body == '.') {
+        if (display_active()) {
+            return STATUS_BUSY;
+        }
+        if (bus_packet.destination != PACKET_EVERYBODY) {
+            last_origin = bus_packet.origin;
+        }
+        show(body);
+        return STATUS_OK;
+    }
+    if (*body == '\0') {
+        return STATUS_OK; /* a sequence alone */
+    }
+    const uint8_t tried = trial_on();
+    status_t status = commands_execute_remote((const char *)body);
+    if (status == STATUS_WAIT) {
+        status = STATUS_BUSY;
+    }
+    if (status == STATUS_OK && tried) {
+        trial_confirm();
+    }
+    return status;
+}
+
+/* The answer to what this origin has sent, in the first place; a new one unless it was there with this sequence. */
+static bool find_answer(uint8_t its_sequence)
+{
+    answer_t found = {.origin = bus_packet.origin, .sequence = its_sequence};
+    uint8_t i = 0;
+    while (i < ORIGINS - 1 && answers[i].origin != bus_packet.origin) {
+        i++;
+    }
+    const bool again = bus_strict() && answers[i].origin == bus_packet.origin && answers[i].sequence == its_sequence;
+    if (again) {
+        found = answers[i];
+    }
+    for (uint8_t *byte = (uint8_t *)&answers[i]; byte-- > (uint8_t *)answers;) {
+        byte[sizeof found] = *byte; /* (byte by byte takes less flash) */
+    }
+    answers[0] = found;
+    return again;
+}
+
+static void refuse(void)
+{
+    bus_counters.good--;
+    bus_counters.discarded++;
+}
+
+static void receive(void)
+{
+    const uint8_t *body = bus_packet.body;
+    uint8_t its_sequence = 0;
+    if (bus_strict()) {
+        its_sequence = *body++;
+        if (its_sequence < SEQUENCE) {
+            refuse();
+            return;
+        }
+    }
+    const uint8_t first = *body;
+    if (first == PACKET_ACK || first == PACKET_NAK) {
+        take_answer(body, its_sequence);
+        return;
+    }
+    if (first == PACKET_DC1 || first == PACKET_DC2) {
+        return;
+    }
+    const bool everybody = bus_packet.destination == PACKET_EVERYBODY;
+    if (everybody && first == '$') {
+        refuse();
+        return;
+    }
+    if (find_answer(its_sequence)) {
+        bus_counters.resent++;
+    } else {
+        answers[0].status = execute(body);
+        answers[0].range = range_refused();
+    }
+    owed = !everybody && session.options & SESSION_ACK;
+}
+
+NOINLINE uint8_t network_poll(void)
+{
+    if (shown >= bus_packet.body && shown <= bus_packet.body + PACKET_BODY_BYTES) {
+        return 0; /* the packet is still needed */
+    }
+    const uint16_t now_128us = timebase_128us();
+    const packet_event_t event = bus_poll(now_128us);
+    if (event == PACKET_WHOLE) {
+        receive();
+    } else if (event == PACKET_WRONG && !bus_strict() && bus_packet.destination != PACKET_EVERYBODY) {
+        find_answer(0);
+        answers[0].status = STATUS_LINE_DAMAGED;
+        owed = session.options & SESSION_ACK;
+    } else if (owed) {
+        if (bus_free(now_128us, BUS_ANSWER_CHARACTERS)) {
+            send_answer();
+        }
+    } else if (bus_free(now_128us, BUS_PACKET_CHARACTERS)) {
+        const uint8_t byte = bus_ops_next();
+        if (byte != 0) {
+            uint8_t *end = begin_body(next_sequence());
+            *end = byte;
+            send(PACKET_EVERYBODY, end + 1);
+        } else if (commands_restart_due()) {
+            commands_restart();
+        }
+    }
+    if (asked != FREE && asked != FAILED &&
+        (uint16_t)(now_128us - asked_128us) > bus_port_characters_128us(NETWORK_ANSWER_CHARACTERS) + NETWORK_ANSWER_128US) {
+        greeted = settings.device_id;
+        if (asked == ASKING) {
+            asked = FREE;
+            terminal_report(STATUS_NO_ANSWER);
+        } else {
+            asked = FAILED; /* the line that waits for it tells */
+        }
+    }
+    return (uint8_t)(owed | bus_sending());
+}
+
+/* -- showing ---------------------------------------------------------------------------------------------------------- */
+
+/* As it is, or a control character in hexadecimal. */
+static uint8_t put_safe(uint8_t c)
+{
+    if (c >= ' ' && c < 0x7F) {
+        terminal_port_put(c);
+        return 1;
+    }
+    text_put_flash(FLASH_TEXT("\\x"));
+    text_put_hex(c);
+    return 4;
+}
+
+bool network_show(void)
+{
+    if (shown == 0) {
+        return false;
+    }
+    if (!begun) {
+        begun = true;
+        switch (*shown) {
+        case PACKET_NAK: text_put_flash(FLASH_TEXT("NA")); /* and: */
+        case PACKET_ACK:
+            terminal_port_put('K');
+            if (*++shown != '\0') {
+                terminal_port_put(' ');
+            }
+            break;
+        default:
+            text_put_u32(bus_packet.origin);
+            terminal_port_put(':');
+            text_put_u32(bus_packet.destination);
+            terminal_port_put('>');
+        }
+        return true;
+    }
+    uint8_t room = TEXT_PIECE_BYTES - 4;
+    while (*shown != '\0') {
+        const uint8_t count = put_safe(*shown++);
+        if (room < 4 + count) {
+            return true;
+        }
+        room = (uint8_t)(room - count);
+    }
+    text_new_line();
+    shown = 0;
+    return true;
+}

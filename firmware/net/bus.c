@@ -1,0 +1,117 @@
+#include "net/bus.h"
+#include "base/inline.h"
+#include "base/zeroed.h"
+#include "net/bus_port.h"
+#include "settings.h"
+
+bus_counters_t bus_counters;
+packet_t bus_packet;
+
+static enum { LISTENING, PUTTING, LEAVING } phase; /* LEAVING: all is put, the last bits go out */
+static uint8_t put, count; /* bytes of the packet that is sent */
+static uint16_t since_128us; /* something was heard or sent */
+
+static uint8_t ops_waiting;
+static uint8_t ops; /* 1: DC2; the oldest in the highest bit of those waiting */
+
+bool bus_strict(void)
+{
+    return settings.crc_mode == 2;
+}
+
+void bus_init(void)
+{
+    AT_BOOT_ZERO(bus_counters);
+    AT_BOOT_ZERO(bus_packet);
+    AT_BOOT_ZERO(phase);
+    AT_BOOT_ZERO(ops_waiting);
+}
+
+static bool silent_for(uint16_t now_128us, uint8_t characters)
+{
+    return (uint16_t)(now_128us - since_128us) > bus_port_characters_128us(characters);
+}
+
+/* What is to go out; and when it is, what came in meanwhile is dropped. */
+static void send(uint16_t now_128us)
+{
+    since_128us = now_128us;
+    while (put != count) {
+        if (bus_port_free() == 0) {
+            return;
+        }
+        bus_port_put((&bus_packet.stx)[put++]);
+    }
+    if (phase == PUTTING) {
+        phase = LEAVING;
+        bus_port_end();
+    }
+    if (!bus_port_sending()) {
+        while (bus_port_get() >= 0) {
+        }
+        phase = LISTENING;
+    }
+}
+
+NOINLINE packet_event_t bus_poll(uint16_t now_128us)
+{
+    if (phase != LISTENING) {
+        send(now_128us);
+        return PACKET_NONE;
+    }
+    packet_event_t event = PACKET_NONE;
+    for (int16_t byte; event == PACKET_NONE && (byte = bus_port_get()) >= 0;) {
+        since_128us = now_128us;
+        event = packet_take(&bus_packet, (uint8_t)byte, settings.device_id, bus_strict());
+    }
+    if (event == PACKET_NONE && packet_under_way(&bus_packet) && silent_for(now_128us, BUS_SILENCE_CHARACTERS)) {
+        event = packet_end(&bus_packet, settings.device_id, bus_strict());
+    }
+    if (event != PACKET_NONE) {
+        (&bus_counters.good)[event - PACKET_WHOLE]++;
+    }
+    return event;
+}
+
+bool bus_sending(void)
+{
+    return phase != LISTENING;
+}
+
+bool bus_free(uint16_t now_128us, uint8_t characters)
+{
+    return phase == LISTENING && !packet_under_way(&bus_packet) && silent_for(now_128us, characters);
+}
+
+NOINLINE void bus_send(uint8_t destination, bool crc)
+{
+    bus_packet.destination = destination;
+    bus_packet.origin = settings.device_id;
+    count = packet_close(&bus_packet, crc, bus_strict());
+    put = 0;
+    phase = PUTTING;
+    bus_port_begin();
+}
+
+void bus_clear(void)
+{
+    bus_counters = (bus_counters_t){0};
+    bus_port_clear();
+}
+
+void bus_ops(uint8_t byte)
+{
+    if (ops_waiting < 8) {
+        ops_waiting++;
+        ops = (uint8_t)(ops << 1 | (byte == PACKET_DC2));
+    }
+}
+
+uint8_t bus_ops_next(void)
+{
+    if (ops_waiting == 0) {
+        return 0;
+    }
+    ops_waiting--;
+    return ops >> ops_waiting & 1 ? PACKET_DC2 : PACKET_DC1;
+}
