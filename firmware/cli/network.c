@@ -62,52 +62,38 @@ uint8_t network_last_origin(void)
 
 /* -- sending ---------------------------------------------------------------------------------------------------------- */
 
-/* The body begins; returns where it goes on. */
-static uint8_t *begin_body(uint8_t its_sequence)
+/* The body begins; what follows goes to text_to. */
+static NOINLINE void begin_body(uint8_t its_sequence)
 {
-    uint8_t *end = bus_packet.body;
+    text_to = bus_packet.body;
     if (bus_strict()) {
-        *end++ = its_sequence;
+        *text_to++ = its_sequence;
     }
-    return end;
 }
 
-static NOINLINE void send(uint8_t destination, const uint8_t *end)
+static NOINLINE void send(uint8_t destination)
 {
-    bus_packet.length = (uint8_t)(end - bus_packet.body);
+    bus_packet.length = (uint8_t)(text_to - bus_packet.body);
+    text_to = 0;
     bus_send(destination, session.options & SESSION_CRC);
 }
 
-static uint8_t next_sequence(void)
+static NOINLINE void begin_next(void)
 {
     sequence = (uint8_t)((uint8_t)(sequence + 1u) | SEQUENCE);
-    return sequence;
+    begin_body(sequence);
 }
 
 static void send_answer(void)
 {
     owed = false;
     const answer_t *answer = answers;
-    uint8_t *end = begin_body(answer->sequence);
-    *end = PACKET_ACK;
-    if (answer->status != STATUS_OK) {
-        *end = PACKET_NAK;
-    }
-    end++;
+    begin_body(answer->sequence);
+    *text_to++ = answer->status == STATUS_OK ? PACKET_ACK : PACKET_NAK;
     if (bus_strict() && answer->status != STATUS_OK) {
-        text_to = end;
         terminal_put_error(answer->status, answer->range);
-        end = text_to;
-        text_to = 0;
     }
-    send(answer->origin, end);
-}
-
-static void ask(uint8_t what, uint8_t node)
-{
-    asked = what;
-    asked_node = node;
-    asked_128us = timebase_128us();
+    send(answer->origin);
 }
 
 status_t network_send(uint8_t destination, const char *text)
@@ -116,27 +102,30 @@ status_t network_send(uint8_t destination, const char *text)
         asked = FREE;
         return STATUS_NO_ANSWER;
     }
-    if (asked != FREE || owed || shown != 0 || !bus_free(timebase_128us(), BUS_PACKET_CHARACTERS)) {
+    const uint16_t now_128us = timebase_128us();
+    if (asked != FREE || owed || shown != 0 || !bus_free(now_128us, BUS_PACKET_CHARACTERS)) {
         return STATUS_WAIT;
     }
-    uint8_t *end = begin_body(next_sequence());
+    begin_next();
+    status_t status = STATUS_OK;
+    uint8_t what = ASKING;
     /* The receiver must not take a command for a repeat: it hears a sequence first, whenever another one was spoken to. */
     if (bus_strict() && destination != greeted) {
         greeted = destination;
-        if (destination != PACKET_EVERYBODY) {
-            ask(GREETING, destination);
+        what = GREETING;
+        status = STATUS_WAIT;
+    } else {
+        while (*text != '\0') {
+            *text_to++ = (uint8_t)*text++;
         }
-        send(destination, end);
-        return STATUS_WAIT;
-    }
-    while (*text != '\0') {
-        *end++ = (uint8_t)*text++;
     }
     if (destination != PACKET_EVERYBODY) {
-        ask(ASKING, destination);
+        asked = what;
+        asked_node = destination;
+        asked_128us = now_128us;
     }
-    send(destination, end);
-    return STATUS_OK;
+    send(destination);
+    return status;
 }
 
 /* -- receiving -------------------------------------------------------------------------------------------------------- */
@@ -193,22 +182,22 @@ static status_t execute(const uint8_t *body)
 }
 
 /* The answer to what this origin has sent, in the first place; a new one unless it was there with this sequence. */
-static bool find_answer(uint8_t its_sequence)
+static NOINLINE bool find_answer(uint8_t its_sequence)
 {
-    answer_t found = {.origin = bus_packet.origin, .sequence = its_sequence};
-    uint8_t i = 0;
-    while (i < ORIGINS - 1 && answers[i].origin != bus_packet.origin) {
-        i++;
+    answer_t moved = {.origin = bus_packet.origin, .sequence = its_sequence};
+    for (answer_t *at = answers; at != answers + ORIGINS; at++) {
+        const answer_t old = *at;
+        *at = moved;
+        moved = old;
+        if (old.origin == bus_packet.origin) {
+            if (bus_strict() && old.sequence == its_sequence) {
+                answers[0] = old;
+                return true;
+            }
+            break;
+        }
     }
-    const bool again = bus_strict() && answers[i].origin == bus_packet.origin && answers[i].sequence == its_sequence;
-    if (again) {
-        found = answers[i];
-    }
-    for (uint8_t *byte = (uint8_t *)&answers[i]; byte-- > (uint8_t *)answers;) {
-        byte[sizeof found] = *byte; /* (byte by byte takes less flash) */
-    }
-    answers[0] = found;
-    return again;
+    return false;
 }
 
 static void refuse(void)
@@ -270,9 +259,9 @@ NOINLINE uint8_t network_poll(void)
     } else if (bus_free(now_128us, BUS_PACKET_CHARACTERS)) {
         const uint8_t byte = bus_ops_next();
         if (byte != 0) {
-            uint8_t *end = begin_body(next_sequence());
-            *end = byte;
-            send(PACKET_EVERYBODY, end + 1);
+            begin_next();
+            *text_to++ = byte;
+            send(PACKET_EVERYBODY);
         } else if (commands_restart_due()) {
             commands_restart();
         }

@@ -14,7 +14,7 @@ static uint16_t since_128us; /* something was heard or sent */
 static uint8_t ops_waiting;
 static uint8_t ops; /* 1: DC2; the oldest in the highest bit of those waiting */
 
-bool bus_strict(void)
+NOINLINE bool bus_strict(void)
 {
     return settings.crc_mode == 2;
 }
@@ -78,7 +78,7 @@ bool bus_sending(void)
     return phase != LISTENING;
 }
 
-bool bus_free(uint16_t now_128us, uint8_t characters)
+NOINLINE bool bus_free(uint16_t now_128us, uint8_t characters)
 {
     return phase == LISTENING && !packet_under_way(&bus_packet) && silent_for(now_128us, characters);
 }

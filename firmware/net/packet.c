@@ -3,8 +3,6 @@
 
 enum { NOTHING, DESTINATION, ORIGIN, BODY, CRC, NUL };
 
-enum { HEADER_BYTES = 3 };
-
 static NOINLINE uint8_t crc8_add(uint8_t crc, uint8_t byte)
 {
     crc ^= byte;
@@ -18,93 +16,80 @@ static NOINLINE uint8_t crc8_add(uint8_t crc, uint8_t byte)
     return crc;
 }
 
-static bool is_for(const packet_t *packet, uint8_t own)
+static NOINLINE bool is_for(const packet_t *packet, uint8_t own)
 {
     return packet->destination == own || packet->destination == PACKET_EVERYBODY;
-}
-
-/* What became of it, if it is this node's business. */
-static NOINLINE packet_event_t leave(packet_t *packet, uint8_t own, packet_event_t event)
-{
-    packet->expected = NOTHING;
-    return is_for(packet, own) ? event : PACKET_NONE;
 }
 
 packet_event_t packet_take(packet_t *packet, uint8_t byte, uint8_t own, bool strict)
 {
     NEAR(packet);
-    packet_event_t event = PACKET_BROKEN;
-    switch (packet->expected) {
-    case DESTINATION:
-        packet->destination = byte;
-        packet->crc = 0;
-        packet->length = 0;
-        break;
-    case ORIGIN: packet->origin = byte; break;
-    case BODY:
-        if (byte == PACKET_ETX) {
-            packet->expected = CRC;
-            return PACKET_NONE;
+    const uint8_t expected = packet->expected;
+    if (expected == DESTINATION || expected == ORIGIN) {
+        if (expected == ORIGIN) {
+            packet->origin = byte;
+        } else {
+            packet->destination = byte;
+            packet->crc = 0;
+            packet->length = 0;
         }
-        if (byte == PACKET_STX || byte == '\0' || packet->length == PACKET_BODY_BYTES) {
-            event = leave(packet, own, PACKET_BROKEN);
-            if (byte == PACKET_STX) {
-                packet->expected = DESTINATION;
-            }
-            return event;
-        }
-        if (is_for(packet, own)) {
-            packet->body[packet->length] = byte;
-        }
-        packet->length++;
-        packet->crc = crc8_add(packet->crc, byte);
-        return PACKET_NONE;
-    case CRC:
-        if (byte == '\0' && !strict) {
-            event = PACKET_WHOLE; /* it has none */
-            break;
-        }
-        packet->crc ^= byte;
-        packet->expected = NUL;
-        return PACKET_NONE;
-    case NUL:
-        if (byte == '\0') {
-            event = packet->crc == 0 ? PACKET_WHOLE : PACKET_WRONG;
-        }
-        break;
-    default:
-        if (byte == PACKET_STX) {
-            packet->expected = DESTINATION;
-        }
-        return PACKET_NONE;
-    }
-    if (packet->expected <= ORIGIN) {
         if (strict) {
             packet->crc = crc8_add(packet->crc, byte);
         }
         packet->expected++;
         return PACKET_NONE;
     }
-    if (packet->length == 0) {
-        event = PACKET_BROKEN;
-    } else if (is_for(packet, own)) {
-        packet->body[packet->length] = '\0';
+    const bool mine = is_for(packet, own);
+    packet_event_t event = expected == NOTHING ? PACKET_NONE : PACKET_BROKEN;
+    if (expected == BODY) {
+        if (byte == PACKET_ETX && packet->length != 0) {
+            packet->expected = CRC;
+            return PACKET_NONE;
+        }
+        if (byte != '\0' && byte != PACKET_STX && byte != PACKET_ETX && packet->length != PACKET_BODY_BYTES) {
+            if (mine) {
+                packet->body[packet->length] = byte;
+            }
+            packet->length++;
+            packet->crc = crc8_add(packet->crc, byte);
+            return PACKET_NONE;
+        }
+    } else if (expected == CRC) {
+        if (byte != '\0' || strict) {
+            packet->crc ^= byte;
+            packet->expected = NUL;
+            return PACKET_NONE;
+        }
+        event = PACKET_WHOLE; /* it has none */
+    } else if (expected == NUL && byte == '\0') {
+        event = packet->crc == 0 ? PACKET_WHOLE : PACKET_WRONG;
     }
-    event = leave(packet, own, event);
+    packet->expected = NOTHING;
     if (byte == PACKET_STX) {
-        packet->expected = DESTINATION; /* in place of the NUL: the next packet */
+        packet->expected = DESTINATION; /* in place of what was expected: the next packet */
+    }
+    if (!mine) {
+        return PACKET_NONE;
+    }
+    if (event == PACKET_WHOLE) {
+        packet->body[packet->length] = '\0';
     }
     return event;
 }
 
 packet_event_t packet_end(packet_t *packet, uint8_t own, bool strict)
 {
-    if (packet->expected == BODY && !strict && packet->length == 1 && is_for(packet, own) &&
-        (packet->body[0] == PACKET_ACK || packet->body[0] == PACKET_NAK)) {
+    NEAR(packet);
+    packet_event_t event = PACKET_BROKEN;
+    if (packet->expected <= ORIGIN || !is_for(packet, own)) {
+        event = PACKET_NONE;
+    } else if (packet->expected == BODY && !strict && packet->length == 1 &&
+               (packet->body[0] == PACKET_ACK || packet->body[0] == PACKET_NAK)) {
         packet->body[1] = '\0';
-        return leave(packet, own, PACKET_WHOLE);
+        event = PACKET_WHOLE;
     }
-    return leave(packet, own, packet->expected > ORIGIN ? PACKET_BROKEN : PACKET_NONE);
+    packet->expected = NOTHING;
+    return event;
 }
 
 bool packet_under_way(const packet_t *packet)
