@@ -28,7 +28,7 @@ typedef struct {
 
 enum { ORIGINS = 4 };
 static answer_t answers[ORIGINS]; /* the last one first */
-static bool owed;                 /* answers[0] is to be sent */
+static uint8_t owed;              /* not 0: answers[0] is to be sent */
 
 static uint8_t last_origin;
 
@@ -67,7 +67,7 @@ static NOINLINE void begin_body(uint8_t its_sequence)
 {
     text_to = bus_packet.body;
     if (bus_strict()) {
-        *text_to++ = its_sequence;
+        text_put_byte(its_sequence);
     }
 }
 
@@ -86,10 +86,10 @@ static NOINLINE void begin_next(void)
 
 static void send_answer(void)
 {
-    owed = false;
+    owed = 0;
     const answer_t *answer = answers;
     begin_body(answer->sequence);
-    *text_to++ = answer->status == STATUS_OK ? PACKET_ACK : PACKET_NAK;
+    text_put_byte(answer->status == STATUS_OK ? PACKET_ACK : PACKET_NAK);
     if (bus_strict() && answer->status != STATUS_OK) {
         terminal_put_error(answer->status, answer->range);
     }
@@ -116,7 +116,7 @@ status_t network_send(uint8_t destination, const char *text)
         status = STATUS_WAIT;
     } else {
         while (*text != '\0') {
-            *text_to++ = (uint8_t)*text++;
+            text_put_byte((uint8_t)*text++);
         }
     }
     if (destination != PACKET_EVERYBODY) {
@@ -236,7 +236,7 @@ static void receive(void)
         answers[0].status = execute(body);
         answers[0].range = range_refused();
     }
-    owed = !everybody && session.options & SESSION_ACK;
+    owed = everybody ? 0 : session.options & SESSION_ACK;
 }
 
 NOINLINE uint8_t network_poll(void)
@@ -260,7 +260,7 @@ NOINLINE uint8_t network_poll(void)
         const uint8_t byte = bus_ops_next();
         if (byte != 0) {
             begin_next();
-            *text_to++ = byte;
+            text_put_byte(byte);
             send(PACKET_EVERYBODY);
         } else if (commands_restart_due()) {
             commands_restart();

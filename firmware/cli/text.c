@@ -6,7 +6,7 @@
 
 uint8_t *text_to;
 
-static NOINLINE void out(uint8_t c)
+NOINLINE void text_put_byte(uint8_t c)
 {
     if (text_to != 0) {
         *text_to++ = c;
@@ -27,10 +27,10 @@ NOINLINE uint8_t text_put(uint8_t c)
     uint8_t count = 1;
     for (; c >= 0x80; count++) {
         const uint8_t *pair = pairs[0] + (uint8_t)(c << 1);
-        out(flash_u8(pair));
+        text_put_byte(flash_u8(pair));
         c = flash_u8(pair + 1);
     }
-    out(c);
+    text_put_byte(c);
     return count;
 }
 
@@ -47,7 +47,7 @@ void text_put_decimal(uint32_t value, uint8_t decimals)
 {
     char text[NUMBER_TEXT_BYTES];
     for (const char *c = number_format(text, value, decimals); *c != '\0'; c++) {
-        out((uint8_t)*c);
+        text_put_byte((uint8_t)*c);
     }
 }
 
@@ -58,7 +58,7 @@ NOINLINE void text_put_u32(uint32_t value)
 
 static NOINLINE void put_hex_digit(uint8_t digit)
 {
-    terminal_port_put((uint8_t)(digit + (digit < 10 ? '0' : 'A' - 10)));
+    text_put_byte((uint8_t)(digit + (digit < 10 ? '0' : 'A' - 10)));
 }
 
 void text_put_hex(uint8_t byte)
@@ -69,6 +69,6 @@ void text_put_hex(uint8_t byte)
 
 void text_new_line(void)
 {
-    terminal_port_put('\r');
-    terminal_port_put('\n');
+    text_put_byte('\r');
+    text_put_byte('\n');
 }

@@ -13,6 +13,8 @@ extern uint8_t *text_to;
 #define TEXT_PIECE_BYTES 24
 #define TEXT_ERROR_BYTES 28 /* but an error with its range */
 
+void text_put_byte(uint8_t c); /* as it is */
+
 /* A character of a text in flash: it may stand for up to TEXT_LONGEST (tools/pack_texts.py). Returns how many were put. */
 #define TEXT_LONGEST 4
 uint8_t text_put(uint8_t c);
