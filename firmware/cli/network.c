@@ -102,8 +102,7 @@ status_t network_send(uint8_t destination, const char *text)
         asked = FREE;
         return STATUS_NO_ANSWER;
     }
-    const uint16_t now_128us = timebase_128us();
-    if (asked != FREE || owed || shown != 0 || !bus_free(now_128us, BUS_PACKET_CHARACTERS)) {
+    if (asked != FREE || owed || shown != 0 || !bus_free(BUS_PACKET_CHARACTERS)) {
         return STATUS_WAIT;
     }
     begin_next();
@@ -122,7 +121,7 @@ status_t network_send(uint8_t destination, const char *text)
     if (destination != PACKET_EVERYBODY) {
         asked = what;
         asked_node = destination;
-        asked_128us = now_128us;
+        asked_128us = timebase_128us();
     }
     send(destination);
     return status;
@@ -244,8 +243,7 @@ NOINLINE uint8_t network_poll(void)
     if (shown >= bus_packet.body && shown <= bus_packet.body + PACKET_BODY_BYTES) {
         return 0; /* the packet is still needed */
     }
-    const uint16_t now_128us = timebase_128us();
-    const packet_event_t event = bus_poll(now_128us);
+    const packet_event_t event = bus_poll();
     if (event == PACKET_WHOLE) {
         receive();
     } else if (event == PACKET_WRONG && !bus_strict() && bus_packet.destination != PACKET_EVERYBODY) {
@@ -253,10 +251,10 @@ NOINLINE uint8_t network_poll(void)
         answers[0].status = STATUS_LINE_DAMAGED;
         owed = session.options & SESSION_ACK;
     } else if (owed) {
-        if (bus_free(now_128us, BUS_ANSWER_CHARACTERS)) {
+        if (bus_free(BUS_ANSWER_CHARACTERS)) {
             send_answer();
         }
-    } else if (bus_free(now_128us, BUS_PACKET_CHARACTERS)) {
+    } else if (bus_free(BUS_PACKET_CHARACTERS)) {
         const uint8_t byte = bus_ops_next();
         if (byte != 0) {
             begin_next();
@@ -267,7 +265,7 @@ NOINLINE uint8_t network_poll(void)
         }
     }
     if (asked != FREE && asked != FAILED &&
-        (uint16_t)(now_128us - asked_128us) > bus_port_characters_128us(NETWORK_ANSWER_CHARACTERS) + NETWORK_ANSWER_128US) {
+        (uint16_t)(timebase_128us() - asked_128us) > bus_port_characters_128us(NETWORK_ANSWER_CHARACTERS) + NETWORK_ANSWER_128US) {
         greeted = settings.device_id;
         if (asked == ASKING) {
             asked = FREE;

@@ -14,9 +14,9 @@ void timebase_start(void)
     TCCR0B = _BV(CS01) | _BV(CS00);
 }
 
-uint16_t timebase_128us(void)
+__attribute__((noinline)) uint16_t timebase_128us(void)
 {
-    return (uint16_t)timebase_overflows;
+    uint8_t state = atomic_begin(); const uint16_t r = (uint16_t)timebase_overflows; atomic_end(state); return r;
 }
 
 uint8_t timebase_32ms(void)

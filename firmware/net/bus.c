@@ -2,6 +2,7 @@
 #include "base/inline.h"
 #include "base/zeroed.h"
 #include "net/bus_port.h"
+#include "cli/timebase_port.h"
 #include "settings.h"
 
 bus_counters_t bus_counters;
@@ -27,15 +28,20 @@ void bus_init(void)
     AT_BOOT_ZERO(ops_waiting);
 }
 
-static bool silent_for(uint16_t now_128us, uint8_t characters)
+static NOINLINE bool silent_for(uint8_t characters)
 {
-    return (uint16_t)(now_128us - since_128us) > bus_port_characters_128us(characters);
+    return (uint16_t)(timebase_128us() - since_128us) > bus_port_characters_128us(characters);
+}
+
+static NOINLINE void heard(void)
+{
+    since_128us = timebase_128us();
 }
 
 /* What is to go out; and when it is, what came in meanwhile is dropped. */
-static void send(uint16_t now_128us)
+static void send(void)
 {
-    since_128us = now_128us;
+    heard();
     while (put != count) {
         if (bus_port_free() == 0) {
             return;
@@ -53,18 +59,18 @@ static void send(uint16_t now_128us)
     }
 }
 
-NOINLINE packet_event_t bus_poll(uint16_t now_128us)
+NOINLINE packet_event_t bus_poll(void)
 {
     if (phase != LISTENING) {
-        send(now_128us);
+        send();
         return PACKET_NONE;
     }
     packet_event_t event = PACKET_NONE;
     for (int16_t byte; event == PACKET_NONE && (byte = bus_port_get()) >= 0;) {
-        since_128us = now_128us;
+        heard();
         event = packet_take(&bus_packet, (uint8_t)byte, settings.device_id, bus_strict());
     }
-    if (event == PACKET_NONE && packet_under_way(&bus_packet) && silent_for(now_128us, BUS_SILENCE_CHARACTERS)) {
+    if (event == PACKET_NONE && packet_under_way(&bus_packet) && silent_for(BUS_SILENCE_CHARACTERS)) {
         event = packet_end(&bus_packet, settings.device_id, bus_strict());
     }
     if (event != PACKET_NONE) {
@@ -78,9 +84,9 @@ bool bus_sending(void)
     return phase != LISTENING;
 }
 
-NOINLINE bool bus_free(uint16_t now_128us, uint8_t characters)
+NOINLINE bool bus_free(uint8_t characters)
 {
-    return phase == LISTENING && !packet_under_way(&bus_packet) && silent_for(now_128us, characters);
+    return phase == LISTENING && !packet_under_way(&bus_packet) && silent_for(characters);
 }
 
 NOINLINE void bus_send(uint8_t destination, bool crc)

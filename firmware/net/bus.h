@@ -3,7 +3,7 @@
  * One buffer serves both ways. A packet that has been received stays in it until bus_poll() is called again, and what
  * arrives meanwhile waits in the port's ring; a packet is put together in it when the bus is free for it. What arrives
  * while one's own packet goes out is its echo, and dropped.
- * Units:   128 us of timebase_128us(), characters of the port's rate.
+ * Units:   128 us, characters of the port's rate.
  * Context: main loop. Errors: PACKET_WRONG and PACKET_BROKEN are counted here.
  * Tests:   test/host/test_network.c with test/host/fakes/bus_port_fake.c; test/image/test_image_network.c
  * Source:  manual lines 183, 191-205, 215-217; decisions 0.4, A-NET-13, A-NET-14. */
@@ -30,10 +30,10 @@ enum { BUS_ANSWER_CHARACTERS = 1, BUS_PACKET_CHARACTERS = 3, BUS_SILENCE_CHARACT
 
 void bus_init(void);
 
-packet_event_t bus_poll(uint16_t now_128us);
+packet_event_t bus_poll(void);
 
 /* Nothing is on its way in or out, and nothing has been for so many characters. */
-bool bus_free(uint16_t now_128us, uint8_t characters);
+bool bus_free(uint8_t characters);
 bool bus_sending(void);
 
 /* With body and length in bus_packet, while bus_free(). crc: as the session says; strict packets have one always. */

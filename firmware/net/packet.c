@@ -101,18 +101,15 @@ uint8_t packet_close(packet_t *packet, bool crc, bool strict)
 {
     NEAR(packet);
     packet->stx = PACKET_STX;
-    uint8_t *end;
-    uint8_t sum;
-    do {
-        end = packet->body + packet->length;
-        sum = 0;
-        for (const uint8_t *byte = strict ? &packet->destination : packet->body; byte != end; byte++) {
-            sum = crc8_add(sum, *byte);
-        }
-        *end = ' '; /* a CRC of 0 would read as none, and a space changes it */
-        packet->length++;
-    } while (sum == 0 && crc && !strict);
-    packet->length--;
+    uint8_t *end = packet->body + packet->length;
+    uint8_t sum = 0;
+    for (const uint8_t *byte = strict ? &packet->destination : packet->body; byte != end; byte++) {
+        sum = crc8_add(sum, *byte);
+    }
+    if (crc && !strict && sum == 0) { /* would read as none */
+        sum = crc8_add(sum, ' ');
+        *end++ = ' ';
+    }
     *end++ = PACKET_ETX;
     if (crc || strict) {
         *end++ = sum;
