@@ -51,6 +51,8 @@ static struct {
     uint8_t running_gear; /* of the pulse being played when the position was last looked at */
     uint8_t origin;       /* a full step's position, modulo 256 */
     uint8_t gear_bits;    /* the gear, and MS1 to MS3, as segments have them */
+    uint8_t part_mask;    /* the bits of a number of smallest steps that are less than a pulse in this gear ... */
+    uint8_t step_mask;    /* ... and less than a full step */
     int32_t adjust_q16;   /* each interval is longer by so many ticks: xclk - ihd */
     bool plain;           /* it is not, and a tick is a cycle */
     const motion_command_t *next; /* offered, not begun; null: nothing */
@@ -155,9 +157,15 @@ static uint8_t direction_flags(const motion_command_t *c, bool turn)
 
 /* -- gears ------------------------------------------------------------------------------------------------------- */
 
+static NOINLINE uint8_t mask_below(uint8_t log2)
+{
+    return (uint8_t)((1u << log2) - 1u);
+}
+
 static NOINLINE void set_gear(uint8_t gear)
 {
     engine.gear = gear;
+    engine.part_mask = mask_below(gear);
     engine.gear_bits = (uint8_t)(drivers_pins(settings.driver_id, (uint8_t)(basis.factor_log2 - gear), settings.driver_map)
                                      << SEGMENT_MS_SHIFT |
                                  gear);
@@ -174,7 +182,7 @@ static NOINLINE uint8_t to_full_step(void)
     uint8_t place = (uint8_t)((uint8_t)engine.emitted - engine.origin);
     if (!is_ccw(&command))
         place = (uint8_t)(0u - place);
-    return place & (uint8_t)((1u << basis.factor_log2) - 1u);
+    return place & engine.step_mask;
 }
 
 /* In standstill: the lowest, but within a step that of it is kept. */
@@ -190,6 +198,7 @@ void engine_init(void)
     uint32_t clock_hz = settings.internal_clock ? TICKS_PER_US * 1000000u : settings.xclk_hz;
     profile_basis(&basis, settings.steps_per_rev, drivers_ustep(settings.driver_id, settings.ustep),
                   settings.slow_rpm, clock_hz);
+    engine.step_mask = mask_below(basis.factor_log2);
     engine.v_in_play = basis.v_slow;
     engine.in_play_cycle_us = 0;
     engine.gap_off = false;
@@ -267,13 +276,13 @@ static NOINLINE uint16_t pulses_left(void)
  * at the end that is no whole pulse, those up to the last full step only. */
 static NOINLINE uint16_t pulses_in_gear(void)
 {
-    uint16_t pulse = (uint16_t)(1u << engine.gear);
+    uint8_t part = engine.part_mask;
     uint16_t left = pulses_left();
-    if (left <= pulse)
+    if (left <= part + 1u)
         return 0;
-    left = (uint16_t)(left - pulse);
-    if (left & (pulse - 1u))
-        left = (uint16_t)(left - ((left - to_full_step()) & ((1u << basis.factor_log2) - 1u)));
+    left = (uint16_t)(left - part - 1u);
+    if ((uint8_t)left & part)
+        left = (uint16_t)(left - (uint8_t)((uint8_t)((uint8_t)left - to_full_step()) & engine.step_mask));
     return left;
 }
 
@@ -352,7 +361,7 @@ static void absorb_held(void)
     uint16_t held = (uint16_t)(pulses << gear_of(last));
     /* The cruise becomes shorter, or, where there is none, the ramps; the closing interval stays. */
     uint16_t left = pulses_left();
-    uint16_t pulse = (uint16_t)(1u << engine.gear);
+    uint16_t pulse = engine.part_mask + 1u;
     uint16_t given = left > held ? held : left > pulse ? (uint16_t)(left - pulse) : 0;
     engine.owed = (uint16_t)(engine.owed + held - given);
     take(&profile.decel_pulses, take(&profile.accel_pulses, take(&profile.cruise_pulses, given)));
@@ -593,7 +602,7 @@ static NOINLINE uint16_t pulses_of_phase(void)
     uint32_t left = *engine.phase_left;
     if (left < most)
         most = (uint16_t)left;
-    return most & (uint16_t)(0u - (1u << engine.gear));
+    return most & (uint16_t)~engine.part_mask;
 }
 
 /* Appends what the ring has room for of the block. */
@@ -687,9 +696,9 @@ static NOINLINE uint16_t next_group(uint16_t at_most, ramp_time_t *sum)
     uint8_t gear = engine.gear;
     ramp.least_log2 = gear;
     ramp.split_ticks = gear ? (uint8_t)0 : basis.ramp.split_ticks;
-    uint8_t part = (uint8_t)((1u << gear) - 1u);
+    uint8_t part = engine.part_mask;
     uint16_t steps = ramp_next(&ramp, at_most, sum, &block);
-    while (steps & part) { /* steep: in less than a pulse the velocity changes by much */
+    while ((uint8_t)steps & part) { /* steep: in less than a pulse the velocity changes by much */
         ramp_time_t more;
         steps = (uint16_t)(steps + ramp_next(&ramp, (uint8_t)(0u - steps) & part, &more, &block));
         uint32_t frac = (uint32_t)sum->frac_q16 + more.frac_q16;
@@ -705,9 +714,9 @@ static NOINLINE uint16_t next_group(uint16_t at_most, ramp_time_t *sum)
     if (b->runs) {
         for (; gear; gear--) { /* from the smallest steps to pulses */
             b->pulses >>= 1;
-            b->top_q16 = 2 * b->top_q16 + 65536u;
-            b->slope_q16 *= 2;
-            b->curve_q16 *= 2;
+            b->top_q16 += 65536u / 2;
+            for (uint8_t i = 0; i < 3; i++)
+                (&b->top_q16)[i] *= 2; /* slope and curve stand behind it */
         }
     }
     int32_t adjust_q16 = engine.adjust_q16;
@@ -746,8 +755,8 @@ static NOINLINE uint8_t wanted_gear(uint16_t left)
     uint8_t gear = 0;
     for (; gear < basis.factor_log2 && ticks < ticks_of_cycles(GEAR_CYCLES); gear++)
         ticks = (uint16_t)(ticks << 1);
-    if (left >> basis.factor_log2 == 0) {
-        while (left & ((1u << gear) - 1u))
+    if (left <= engine.step_mask) {
+        while ((uint8_t)left & mask_below(gear))
             gear--;
     }
     return gear;
@@ -757,7 +766,7 @@ static NOINLINE uint8_t wanted_gear(uint16_t left)
 static NOINLINE void emit_phase(void)
 {
     uint16_t at_most = pulses_of_phase();
-    uint16_t pulse = (uint16_t)(1u << engine.gear);
+    uint16_t pulse = engine.part_mask + 1u;
     uint8_t gear = engine.gear;
     bool closing = pulses_left() <= pulse;
     if (closing || engine.ahead_ticks || engine.owed >= pulse) {
@@ -1388,7 +1397,7 @@ static void end_command(accel_code_t decel, bool linear)
     profile.cruise.chunks = ticks >> PROFILE_CHUNK_LOG2;
     profile.cruise.ticks_q8 = (ticks & (PROFILE_CHUNK_TICKS - 1)) << 8;
     if (settings.auto_microstep) /* to a full step; the closing interval */
-        profile.cruise_pulses = ((to_full_step() + (1u << engine.gear) - 1u) & ((1u << basis.factor_log2) - 1u)) + 1u;
+        profile.cruise_pulses = (uint8_t)((uint8_t)(to_full_step() + engine.part_mask) & engine.step_mask) + 1u;
     else if (profile.decel_pulses == 0)
         profile.cruise_pulses = 1; /* the closing interval */
     engine.endless = false;
