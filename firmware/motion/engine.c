@@ -578,14 +578,14 @@ static void emit_flat(uint16_t pulses, uint32_t ticks)
         return;
     }
     uint16_t each = (uint16_t)(ticks / pulses);
-    uint16_t longer = (uint16_t)((uint16_t)ticks - each * pulses);
+    uint16_t longer = (uint16_t)(ticks % pulses);
     uint16_t ideal = longer;
     uint8_t early = early_of((uint16_t)(each - 1));
     if (longer <= early)
         longer = 0;
     else if (pulses - longer <= early)
         longer = pulses;
-    engine.carry_q16 += (int32_t)(int16_t)(ideal - longer) * 65536;
+    engine.carry_q16 += (int32_t)((uint32_t)(uint16_t)(ideal - longer) << 16);
     uint8_t more = engine.ramp_state == MOTION_CRUISE || speeds_up();
     for (uint8_t kinds = 2; kinds; kinds--) {
         uint16_t some = more ? longer : (uint16_t)(pulses - longer);
@@ -652,7 +652,7 @@ static void begin_block(void)
 }
 
 /* Intervals of the cruise, as ramp_next() has those of a ramp: one, or as many as there are, or a block. */
-static uint16_t cruise_next(uint16_t run, ramp_time_t *sum)
+static NOINLINE uint16_t cruise_next(uint16_t run, ramp_time_t *sum)
 {
     uint32_t chunks = profile.cruise.chunks;
     uint8_t gear = engine.gear;
@@ -694,7 +694,7 @@ static NOINLINE uint16_t next_group(uint16_t at_most, ramp_time_t *sum)
     if (engine.ramp_state == MOTION_CRUISE)
         return cruise_next(at_most, sum);
     uint8_t gear = engine.gear;
-    ramp.least_log2 = gear;
+    ramp.least_run = (uint8_t)(engine.part_mask + 1);
     ramp.split_ticks = gear ? (uint8_t)0 : basis.ramp.split_ticks;
     uint8_t part = engine.part_mask;
     uint16_t steps = ramp_next(&ramp, at_most, sum, &block);
@@ -950,19 +950,19 @@ static void take_next(void)
 /* The first interval of most profiles is long, whatever the rest turns out to be: then the first pulse need not wait for
  * the planning. Returns the state it belongs to if it is surely longer than the silence that planning takes, from few
  * operations, otherwise MOTION_STANDBY. */
-static motion_state_t certain_state(void)
+static NOINLINE motion_state_t certain_state(void)
 {
     const motion_command_t *c = &command;
     NEAR(c);
     uint32_t velocity = c->velocity;
-    bool is_cycle = c->flags & MOTION_CYCLE;
+    uint8_t is_cycle = c->flags & MOTION_CYCLE;
     uint16_t accel = c->accel;
-    bool certain;
-    if (engine.v_in_play != basis.v_slow || !engine.plain)
+    if (!engine.plain || engine.v_in_play != basis.v_slow)
         return MOTION_STANDBY;
     if (accel == ACCEL_NONE) { /* the cruise interval, or that of the deceleration from there */
-        certain = is_cycle && velocity >> basis.factor_log2 >= AHEAD_LONG_TICKS / TICKS_PER_US + 8;
-        return certain ? MOTION_CRUISE : MOTION_STANDBY;
+        if (is_cycle && velocity >> basis.factor_log2 >= AHEAD_LONG_TICKS / TICKS_PER_US + 8)
+            return MOTION_CRUISE;
+        return MOTION_STANDBY;
     }
     if (basis.slow_ticks < AHEAD_TICKS + SHORTEST_PIECE_TICKS)
         return MOTION_STANDBY;
@@ -973,11 +973,13 @@ static motion_state_t certain_state(void)
         least_rpm = (uint16_t)(settings.slow_rpm + 2u + whole); /* at least one step, at slow speed */
     else if (whole > certain_accel || accel > c->decel)
         return MOTION_STANDBY; /* (steeper than the deceleration: truncated, it may have no step) */
-    if (is_cycle)
-        certain = velocity <= UINT16_MAX && (uint32_t)least_rpm * (uint16_t)velocity <= basis.us_rpm;
-    else
-        certain = velocity >= least_rpm;
-    return certain ? MOTION_ACCEL : MOTION_STANDBY;
+    if (!is_cycle) {
+        if (velocity < least_rpm)
+            return MOTION_STANDBY;
+    } else if (velocity > UINT16_MAX || (uint32_t)least_rpm * (uint16_t)velocity > basis.us_rpm) {
+        return MOTION_STANDBY;
+    }
+    return MOTION_ACCEL;
 }
 
 /* Emits enough to be played until the next round of the main loop, and where a ramp begins steeply, before the timer
