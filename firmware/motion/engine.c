@@ -548,7 +548,7 @@ static NOINLINE void choose_phase(void)
 {
     motion_state_t state = MOTION_ACCEL;
     uint32_t *left = &profile.accel_pulses;
-    while (*left >> engine.gear == 0 && state != MOTION_DECEL) {
+    while (*left <= engine.part_mask && state != MOTION_DECEL) {
         left[1] += *left; /* part of a pulse */
         *left = 0;
         left++; /* cruise, deceleration */
@@ -631,7 +631,7 @@ static void begin_block(void)
 {
     block_t *b = &block;
     NEAR(b);
-    uint8_t split = (b->top_q16 >> 16) + 1 >= basis.ramp.split_ticks ? BLOCK_SPLIT : 0;
+    uint8_t split = (uint16_t)((uint16_t)(b->top_q16 >> 16) + 1u) >= basis.ramp.split_ticks ? BLOCK_SPLIT : 0;
     b->shape = speeds_up() ? split | BLOCK_FASTER : split;
     uint32_t carry = 0;
     if (engine.carry_q16 > 0) { /* otherwise it waits for a single interval */

@@ -340,11 +340,9 @@ static uint16_t harmonic_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16)
             left = (uint16_t)above;
     }
     uint16_t pulses = choose_group(ramp, left);
-    uint32_t change = step * pulses;
-    if (!ramp->faster) {
-        change = 0u - change;
+    if (!ramp->faster)
         step = 0u - step;
-    }
+    uint32_t change = step * pulses;
     uint32_t v_end = v + change;
     ramp->v = v_end;
     set_interval(ramp, interval_q16, ramp->bounded ? 2 * cap : v + v_end - step);
