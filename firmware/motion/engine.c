@@ -192,6 +192,12 @@ static NOINLINE void reset_gear(void)
     step_port_microsteps(engine.gear_bits >> SEGMENT_MS_SHIFT);
 }
 
+static NOINLINE void forget_velocity(void)
+{
+    engine.v_in_play = basis.v_slow;
+    engine.in_play_cycle_us = 0;
+}
+
 void engine_init(void)
 {
     uint8_t factor_log2 = basis.factor_log2;
@@ -199,8 +205,7 @@ void engine_init(void)
     profile_basis(&basis, settings.steps_per_rev, drivers_ustep(settings.driver_id, settings.ustep),
                   settings.slow_rpm, clock_hz);
     engine.step_mask = mask_below(basis.factor_log2);
-    engine.v_in_play = basis.v_slow;
-    engine.in_play_cycle_us = 0;
+    forget_velocity();
     engine.gap_off = false;
     /* sqrt(3.217e15 / (sprf * F * accel)) ticks; with so many steps there is one at least. */
     certain_accel = (uint16_t)(basis.ramp.steps_per_rev < 200 ? 0 : (1300000u >> basis.factor_log2) / basis.ramp.steps_per_rev);
@@ -432,8 +437,8 @@ static void push(uint16_t periods, uint16_t ticks, bool pulse)
         uint16_t given = (uint16_t)(engine.owed >> engine.gear);
         if (given > periods)
             given = periods;
-        engine.owed = (uint16_t)(engine.owed - (given << engine.gear));
         periods = (uint16_t)(periods - given);
+        engine.owed = (uint16_t)(engine.owed - (given << engine.gear));
     }
     if (periods)
         append_run(periods, ticks, pulse, (uint8_t)(engine.ramp_state | direction_flags(&command, turn)));
@@ -906,12 +911,6 @@ static void begin_ring(void)
     drop_emission();
     if (settings.auto_microstep)
         reset_gear();
-}
-
-static void forget_velocity(void)
-{
-    engine.v_in_play = basis.v_slow;
-    engine.in_play_cycle_us = 0;
 }
 
 /* Is the velocity in play kept until now? */
