@@ -163,6 +163,8 @@ AVR_SMALLER = -Os -mcall-prologues -mstrict-X -fno-gcse -fno-move-loop-invariant
     -flto -fno-tree-forwprop -fno-tree-dominator-opts -fno-inline-small-functions -fira-algorithm=priority -fira-region=all \
     -fno-tree-sink -fweb -frename-registers -fno-tree-copy-prop -fno-tree-coalesce-vars \
     -fno-tree-scev-cprop -fno-tree-copyrename -flto-partition=none $(if $(filter 5.%,$(AVR_VERSION)),-fno-toplevel-reorder)
+# Arithmetic of 32 bits nearly throughout: smaller if the registers of a value stay together.
+WIDE_SRCS := firmware/motion/ramp.c firmware/motion/profile.c
 AVR_CFLAGS = $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 $(AVR_SMALLER) -g -ffunction-sections -fdata-sections -fshort-enums \
     -fstack-usage -I$(BUILD)/packed -Ifirmware $(AVR_WARNINGS)
 AVR_LDFLAGS := $(AVR_MCU) -Wl,--gc-sections -mrelax -nostartfiles -T firmware/image.ld -Lfirmware
@@ -176,7 +178,7 @@ firmware: $(BUILD)/sac.hex budgets ## build/sac.elf and build/sac.hex; budgets o
 # Rewritten only when it changes; every object depends on it. Several makes may look at it at the same time.
 $(BUILD)/firmware/flags: FORCE
 	@mkdir -p $(@D)
-	@echo '$(AVR) $(AVR_CFLAGS) $(AVR_LDFLAGS) $(DEFS) $(FIRMWARE_SRCS)' >$@.$$$$ && \
+	@echo '$(AVR) $(AVR_CFLAGS) $(AVR_LDFLAGS) $(DEFS) $(FIRMWARE_SRCS) $(WIDE_SRCS)' >$@.$$$$ && \
 	    if cmp -s $@.$$$$ $@; then rm $@.$$$$; else mv $@.$$$$ $@; fi
 
 # The tables with texts, packed: the compiler finds them before those in firmware/.
@@ -190,7 +192,7 @@ $(PACKED): tools/pack_texts.py firmware/cli/pairs.def firmware/cli/commands.def 
 $(BUILD)/firmware/%.o: firmware/% $(BUILD)/firmware/flags $(PACKED)
 	@mkdir -p $(@D)
 	$(call say,CC  $@)
-	$(Q)$(AVR)gcc $(AVR_CFLAGS) $(DEFS) -MMD -MP -c -o $@ $<
+	$(Q)$(AVR)gcc $(AVR_CFLAGS) $(if $(filter $<,$(WIDE_SRCS)),-fno-split-wide-types) $(DEFS) -MMD -MP -c -o $@ $<
 
 $(BUILD)/sac.elf: $(FIRMWARE_OBJS) $(LINK_SCRIPTS) $(BUILD)/firmware/flags
 	$(call say,LD  $@)

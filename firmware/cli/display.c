@@ -265,9 +265,8 @@ static void print_piece(void)
         }
         if (character >= FIELD_COUNT && character < FIELDS_END) {
             if (put == 0) {
-                shown.text = text + 1;
+                text++;
                 print_field(character, command);
-                return;
             }
             break;
         }

@@ -301,10 +301,10 @@ static void take_other(motion_syntax_t *syntax, uint8_t c)
 {
     if (c == '.') {
         take_point(syntax);
-    } else if (c == '-') {
-        take_minus(syntax);
     } else if (c == ' ') {
         syntax->given |= ENDED;
+    } else if (c == '-') {
+        take_minus(syntax);
     } else {
         take_letter(syntax, (uint8_t)((c | 0x20) - 'a'));
     }

@@ -51,6 +51,8 @@ static struct {
     uint8_t running_gear; /* of the pulse being played when the position was last looked at */
     uint8_t origin;       /* a full step's position, modulo 256 */
     uint8_t gear_bits;    /* the gear, and MS1 to MS3, as segments have them */
+    uint8_t part_mask;    /* the bits of a number of smallest steps that are less than a pulse in this gear ... */
+    uint8_t step_mask;    /* ... and less than a full step */
     int32_t adjust_q16;   /* each interval is longer by so many ticks: xclk - ihd */
     bool plain;           /* it is not, and a tick is a cycle */
     const motion_command_t *next; /* offered, not begun; null: nothing */
@@ -155,9 +157,15 @@ static uint8_t direction_flags(const motion_command_t *c, bool turn)
 
 /* -- gears ------------------------------------------------------------------------------------------------------- */
 
+static NOINLINE uint8_t mask_below(uint8_t log2)
+{
+    return (uint8_t)((1u << log2) - 1u);
+}
+
 static NOINLINE void set_gear(uint8_t gear)
 {
     engine.gear = gear;
+    engine.part_mask = mask_below(gear);
     engine.gear_bits = (uint8_t)(drivers_pins(settings.driver_id, (uint8_t)(basis.factor_log2 - gear), settings.driver_map)
                                      << SEGMENT_MS_SHIFT |
                                  gear);
@@ -174,7 +182,7 @@ static NOINLINE uint8_t to_full_step(void)
     uint8_t place = (uint8_t)((uint8_t)engine.emitted - engine.origin);
     if (!is_ccw(&command))
         place = (uint8_t)(0u - place);
-    return place & (uint8_t)((1u << basis.factor_log2) - 1u);
+    return place & engine.step_mask;
 }
 
 /* In standstill: the lowest, but within a step that of it is kept. */
@@ -184,14 +192,20 @@ static NOINLINE void reset_gear(void)
     step_port_microsteps(engine.gear_bits >> SEGMENT_MS_SHIFT);
 }
 
+static NOINLINE void forget_velocity(void)
+{
+    engine.v_in_play = basis.v_slow;
+    engine.in_play_cycle_us = 0;
+}
+
 void engine_init(void)
 {
     uint8_t factor_log2 = basis.factor_log2;
     uint32_t clock_hz = settings.internal_clock ? TICKS_PER_US * 1000000u : settings.xclk_hz;
     profile_basis(&basis, settings.steps_per_rev, drivers_ustep(settings.driver_id, settings.ustep),
                   settings.slow_rpm, clock_hz);
-    engine.v_in_play = basis.v_slow;
-    engine.in_play_cycle_us = 0;
+    engine.step_mask = mask_below(basis.factor_log2);
+    forget_velocity();
     engine.gap_off = false;
     /* sqrt(3.217e15 / (sprf * F * accel)) ticks; with so many steps there is one at least. */
     certain_accel = (uint16_t)(basis.ramp.steps_per_rev < 200 ? 0 : (1300000u >> basis.factor_log2) / basis.ramp.steps_per_rev);
@@ -267,13 +281,13 @@ static NOINLINE uint16_t pulses_left(void)
  * at the end that is no whole pulse, those up to the last full step only. */
 static NOINLINE uint16_t pulses_in_gear(void)
 {
-    uint16_t pulse = (uint16_t)(1u << engine.gear);
+    uint8_t part = engine.part_mask;
     uint16_t left = pulses_left();
-    if (left <= pulse)
+    if (left <= part + 1u)
         return 0;
-    left = (uint16_t)(left - pulse);
-    if (left & (pulse - 1u))
-        left = (uint16_t)(left - ((left - to_full_step()) & ((1u << basis.factor_log2) - 1u)));
+    left = (uint16_t)(left - part - 1u);
+    if ((uint8_t)left & part)
+        left = (uint16_t)(left - (uint8_t)((uint8_t)((uint8_t)left - to_full_step()) & engine.step_mask));
     return left;
 }
 
@@ -352,7 +366,7 @@ static void absorb_held(void)
     uint16_t held = (uint16_t)(pulses << gear_of(last));
     /* The cruise becomes shorter, or, where there is none, the ramps; the closing interval stays. */
     uint16_t left = pulses_left();
-    uint16_t pulse = (uint16_t)(1u << engine.gear);
+    uint16_t pulse = engine.part_mask + 1u;
     uint16_t given = left > held ? held : left > pulse ? (uint16_t)(left - pulse) : 0;
     engine.owed = (uint16_t)(engine.owed + held - given);
     take(&profile.decel_pulses, take(&profile.accel_pulses, take(&profile.cruise_pulses, given)));
@@ -423,8 +437,8 @@ static void push(uint16_t periods, uint16_t ticks, bool pulse)
         uint16_t given = (uint16_t)(engine.owed >> engine.gear);
         if (given > periods)
             given = periods;
-        engine.owed = (uint16_t)(engine.owed - (given << engine.gear));
         periods = (uint16_t)(periods - given);
+        engine.owed = (uint16_t)(engine.owed - (given << engine.gear));
     }
     if (periods)
         append_run(periods, ticks, pulse, (uint8_t)(engine.ramp_state | direction_flags(&command, turn)));
@@ -539,7 +553,7 @@ static NOINLINE void choose_phase(void)
 {
     motion_state_t state = MOTION_ACCEL;
     uint32_t *left = &profile.accel_pulses;
-    while (*left >> engine.gear == 0 && state != MOTION_DECEL) {
+    while (*left <= engine.part_mask && state != MOTION_DECEL) {
         left[1] += *left; /* part of a pulse */
         *left = 0;
         left++; /* cruise, deceleration */
@@ -569,14 +583,14 @@ static void emit_flat(uint16_t pulses, uint32_t ticks)
         return;
     }
     uint16_t each = (uint16_t)(ticks / pulses);
-    uint16_t longer = (uint16_t)((uint16_t)ticks - each * pulses);
+    uint16_t longer = (uint16_t)(ticks % pulses);
     uint16_t ideal = longer;
     uint8_t early = early_of((uint16_t)(each - 1));
     if (longer <= early)
         longer = 0;
     else if (pulses - longer <= early)
         longer = pulses;
-    engine.carry_q16 += (int32_t)(int16_t)(ideal - longer) * 65536;
+    engine.carry_q16 += (int32_t)((uint32_t)(uint16_t)(ideal - longer) << 16);
     uint8_t more = engine.ramp_state == MOTION_CRUISE || speeds_up();
     for (uint8_t kinds = 2; kinds; kinds--) {
         uint16_t some = more ? longer : (uint16_t)(pulses - longer);
@@ -593,7 +607,7 @@ static NOINLINE uint16_t pulses_of_phase(void)
     uint32_t left = *engine.phase_left;
     if (left < most)
         most = (uint16_t)left;
-    return most & (uint16_t)(0u - (1u << engine.gear));
+    return most & (uint16_t)~engine.part_mask;
 }
 
 /* Appends what the ring has room for of the block. */
@@ -622,7 +636,7 @@ static void begin_block(void)
 {
     block_t *b = &block;
     NEAR(b);
-    uint8_t split = (b->top_q16 >> 16) + 1 >= basis.ramp.split_ticks ? BLOCK_SPLIT : 0;
+    uint8_t split = (uint16_t)((uint16_t)(b->top_q16 >> 16) + 1u) >= basis.ramp.split_ticks ? BLOCK_SPLIT : 0;
     b->shape = speeds_up() ? split | BLOCK_FASTER : split;
     uint32_t carry = 0;
     if (engine.carry_q16 > 0) { /* otherwise it waits for a single interval */
@@ -643,7 +657,7 @@ static void begin_block(void)
 }
 
 /* Intervals of the cruise, as ramp_next() has those of a ramp: one, or as many as there are, or a block. */
-static uint16_t cruise_next(uint16_t run, ramp_time_t *sum)
+static NOINLINE uint16_t cruise_next(uint16_t run, ramp_time_t *sum)
 {
     uint32_t chunks = profile.cruise.chunks;
     uint8_t gear = engine.gear;
@@ -685,11 +699,11 @@ static NOINLINE uint16_t next_group(uint16_t at_most, ramp_time_t *sum)
     if (engine.ramp_state == MOTION_CRUISE)
         return cruise_next(at_most, sum);
     uint8_t gear = engine.gear;
-    ramp.least_log2 = gear;
+    ramp.least_run = (uint8_t)(engine.part_mask + 1);
     ramp.split_ticks = gear ? (uint8_t)0 : basis.ramp.split_ticks;
-    uint8_t part = (uint8_t)((1u << gear) - 1u);
+    uint8_t part = engine.part_mask;
     uint16_t steps = ramp_next(&ramp, at_most, sum, &block);
-    while (steps & part) { /* steep: in less than a pulse the velocity changes by much */
+    while ((uint8_t)steps & part) { /* steep: in less than a pulse the velocity changes by much */
         ramp_time_t more;
         steps = (uint16_t)(steps + ramp_next(&ramp, (uint8_t)(0u - steps) & part, &more, &block));
         uint32_t frac = (uint32_t)sum->frac_q16 + more.frac_q16;
@@ -705,9 +719,9 @@ static NOINLINE uint16_t next_group(uint16_t at_most, ramp_time_t *sum)
     if (b->runs) {
         for (; gear; gear--) { /* from the smallest steps to pulses */
             b->pulses >>= 1;
-            b->top_q16 = 2 * b->top_q16 + 65536u;
-            b->slope_q16 *= 2;
-            b->curve_q16 *= 2;
+            b->top_q16 += 65536u / 2;
+            for (uint8_t i = 0; i < 3; i++)
+                (&b->top_q16)[i] *= 2; /* slope and curve stand behind it */
         }
     }
     int32_t adjust_q16 = engine.adjust_q16;
@@ -746,8 +760,8 @@ static NOINLINE uint8_t wanted_gear(uint16_t left)
     uint8_t gear = 0;
     for (; gear < basis.factor_log2 && ticks < ticks_of_cycles(GEAR_CYCLES); gear++)
         ticks = (uint16_t)(ticks << 1);
-    if (left >> basis.factor_log2 == 0) {
-        while (left & ((1u << gear) - 1u))
+    if (left <= engine.step_mask) {
+        while ((uint8_t)left & mask_below(gear))
             gear--;
     }
     return gear;
@@ -757,7 +771,7 @@ static NOINLINE uint8_t wanted_gear(uint16_t left)
 static NOINLINE void emit_phase(void)
 {
     uint16_t at_most = pulses_of_phase();
-    uint16_t pulse = (uint16_t)(1u << engine.gear);
+    uint16_t pulse = engine.part_mask + 1u;
     uint8_t gear = engine.gear;
     bool closing = pulses_left() <= pulse;
     if (closing || engine.ahead_ticks || engine.owed >= pulse) {
@@ -899,12 +913,6 @@ static void begin_ring(void)
         reset_gear();
 }
 
-static void forget_velocity(void)
-{
-    engine.v_in_play = basis.v_slow;
-    engine.in_play_cycle_us = 0;
-}
-
 /* Is the velocity in play kept until now? */
 static void expire_gap(void)
 {
@@ -941,19 +949,19 @@ static void take_next(void)
 /* The first interval of most profiles is long, whatever the rest turns out to be: then the first pulse need not wait for
  * the planning. Returns the state it belongs to if it is surely longer than the silence that planning takes, from few
  * operations, otherwise MOTION_STANDBY. */
-static motion_state_t certain_state(void)
+static NOINLINE motion_state_t certain_state(void)
 {
     const motion_command_t *c = &command;
     NEAR(c);
     uint32_t velocity = c->velocity;
-    bool is_cycle = c->flags & MOTION_CYCLE;
+    uint8_t is_cycle = c->flags & MOTION_CYCLE;
     uint16_t accel = c->accel;
-    bool certain;
-    if (engine.v_in_play != basis.v_slow || !engine.plain)
+    if (!engine.plain || engine.v_in_play != basis.v_slow)
         return MOTION_STANDBY;
     if (accel == ACCEL_NONE) { /* the cruise interval, or that of the deceleration from there */
-        certain = is_cycle && velocity >> basis.factor_log2 >= AHEAD_LONG_TICKS / TICKS_PER_US + 8;
-        return certain ? MOTION_CRUISE : MOTION_STANDBY;
+        if (is_cycle && velocity >> basis.factor_log2 >= AHEAD_LONG_TICKS / TICKS_PER_US + 8)
+            return MOTION_CRUISE;
+        return MOTION_STANDBY;
     }
     if (basis.slow_ticks < AHEAD_TICKS + SHORTEST_PIECE_TICKS)
         return MOTION_STANDBY;
@@ -964,11 +972,13 @@ static motion_state_t certain_state(void)
         least_rpm = (uint16_t)(settings.slow_rpm + 2u + whole); /* at least one step, at slow speed */
     else if (whole > certain_accel || accel > c->decel)
         return MOTION_STANDBY; /* (steeper than the deceleration: truncated, it may have no step) */
-    if (is_cycle)
-        certain = velocity <= UINT16_MAX && (uint32_t)least_rpm * (uint16_t)velocity <= basis.us_rpm;
-    else
-        certain = velocity >= least_rpm;
-    return certain ? MOTION_ACCEL : MOTION_STANDBY;
+    if (!is_cycle) {
+        if (velocity < least_rpm)
+            return MOTION_STANDBY;
+    } else if (velocity > UINT16_MAX || (uint32_t)least_rpm * (uint16_t)velocity > basis.us_rpm) {
+        return MOTION_STANDBY;
+    }
+    return MOTION_ACCEL;
 }
 
 /* Emits enough to be played until the next round of the main loop, and where a ramp begins steeply, before the timer
@@ -1388,7 +1398,7 @@ static void end_command(accel_code_t decel, bool linear)
     profile.cruise.chunks = ticks >> PROFILE_CHUNK_LOG2;
     profile.cruise.ticks_q8 = (ticks & (PROFILE_CHUNK_TICKS - 1)) << 8;
     if (settings.auto_microstep) /* to a full step; the closing interval */
-        profile.cruise_pulses = ((to_full_step() + (1u << engine.gear) - 1u) & ((1u << basis.factor_log2) - 1u)) + 1u;
+        profile.cruise_pulses = (uint8_t)((uint8_t)(to_full_step() + engine.part_mask) & engine.step_mask) + 1u;
     else if (profile.decel_pulses == 0)
         profile.cruise_pulses = 1; /* the closing interval */
     engine.endless = false;

@@ -264,10 +264,9 @@ NOINLINE void profile_plan(profile_t *profile, const profile_basis_t *basis, con
     /* Full steps are truncated as full steps, so that a ramp covers the same steps whatever the factor. */
     uint8_t doublings = factor_log2;
     if (command->flags & MOTION_PULSES) {
-        for (; doublings; doublings--) {
-            wide_add(&accel, &accel);
-            wide_add(&decel, &decel);
-        }
+        wide_shift(&accel, (int8_t)-doublings);
+        wide_shift(&decel, (int8_t)-doublings);
+        doublings = 0;
     }
     bool truncated = split(profile, &accel, &decel, command->count);
     for (; doublings; doublings--) {

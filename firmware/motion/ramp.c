@@ -299,7 +299,7 @@ NOINLINE void ramp_begin(ramp_t *ramp, const ramp_constants_t *constants, uint32
     ramp->bounded = false;
     ramp->run_pulses = 0;
     ramp->k_lacks = 0;
-    ramp->least_log2 = 0;
+    ramp->least_run = 1;
     ramp->cycles_log2 = constants->cycles_log2;
     ramp->split_ticks = constants->split_ticks;
     ramp->group_log2 = ramp->most_log2 = GROUP_MAX_LOG2;
@@ -340,11 +340,9 @@ static uint16_t harmonic_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16)
             left = (uint16_t)above;
     }
     uint16_t pulses = choose_group(ramp, left);
-    uint32_t change = step * pulses;
-    if (!ramp->faster) {
-        change = 0u - change;
+    if (!ramp->faster)
         step = 0u - step;
-    }
+    uint32_t change = step * pulses;
     uint32_t v_end = v + change;
     ramp->v = v_end;
     set_interval(ramp, interval_q16, ramp->bounded ? 2 * cap : v + v_end - step);
@@ -393,7 +391,7 @@ static void divide(ramp_t *ramp, uint16_t pulses, block_t *group, const uint32_t
         uint16_t span = (uint16_t)((ticks - run_pulse_ticks) * run);
         uint16_t least = (uint16_t)((uint16_t)(2 * RUN_CYCLES * (uint8_t)(ramp->steep + 1)) >> ramp->cycles_log2);
         uint32_t most = ticks < ramp->split_ticks ? RUN_SLOPE_Q16 / 4 : RUN_SLOPE_Q16;
-        while (run >> ramp->least_log2 > 1 && slope > most && span >= least) {
+        while (run > ramp->least_run && slope > most && span >= least) {
             run >>= 1;
             odd = (uint8_t)(odd << 1);
             span >>= 1;

@@ -51,7 +51,7 @@ typedef struct {
     uint8_t k_lacks;
     uint8_t cycles_log2; /* as in the constants */
     uint8_t split_ticks;
-    uint8_t least_log2;  /* runs have this power of two pulses at least, where the group is of whole such ones; may be changed
+    uint8_t least_run;   /* runs have so many pulses, a power of two, at least, where the group is of whole such ones; may be changed
                           * between groups */
     wide_t x;           /* linear: v^2 ... */
     wide_t c;           /* ... and its change per pulse */
