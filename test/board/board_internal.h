@@ -233,6 +233,8 @@ struct board {
     struct eeprom *eeprom;
     struct watchdog *watchdog;
     struct reset *reset;
+
+    struct bus_node *bus_node; /* bus.c: the board's place on a line; NULL: on none */
 };
 
 /* simavr adds the instruction's own cycles when the hook has returned. */
