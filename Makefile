@@ -88,9 +88,11 @@ HOST_TESTS := test_number test_status test_baud test_line test_settings test_sto
     test_wide test_block test_ramp test_profile test_engine test_property_planner test_processor_model
 FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 STORE_SRCS := firmware/eeprom/store.c firmware/base/crc16.c firmware/settings.c test/host/fakes/eeprom_port_fake.c
+NET_SRCS := firmware/net/packet.c firmware/net/bus.c test/host/fakes/bus_port_fake.c
 CLI_SRCS := firmware/cli/commands.c firmware/cli/trial.c firmware/cli/configure.c firmware/cli/display.c firmware/cli/text.c firmware/cli/motion_syntax.c \
     firmware/cli/range.c firmware/base/flash.c firmware/base/number.c firmware/queue/encoder.c firmware/queue/ops.c firmware/queue/queue.c firmware/queue/session.c $(STORE_SRCS) \
-    test/host/fakes/encoder_port_fake.c $(FAKE_SRCS)
+    test/host/fakes/encoder_port_fake.c firmware/cli/network.c firmware/cli/terminal.c firmware/cli/line.c firmware/base/status.c \
+    $(NET_SRCS) $(FAKE_SRCS)
 test_number_SRCS := firmware/base/number.c
 test_status_SRCS := firmware/base/status.c firmware/base/flash.c
 test_line_SRCS := firmware/cli/line.c
@@ -98,7 +100,7 @@ test_settings_SRCS := firmware/settings.c
 test_store_SRCS := $(STORE_SRCS)
 test_session_SRCS := firmware/queue/session.c firmware/settings.c
 test_queue_SRCS := firmware/queue/queue.c firmware/queue/session.c $(STORE_SRCS) $(FAKE_SRCS)
-test_ops_SRCS := firmware/queue/ops.c firmware/queue/session.c firmware/settings.c $(FAKE_SRCS)
+test_ops_SRCS := firmware/queue/ops.c firmware/queue/session.c firmware/settings.c $(NET_SRCS) $(FAKE_SRCS)
 test_encoder_SRCS := firmware/queue/encoder.c test/host/fakes/encoder_port_fake.c test/host/fakes/engine_fake.c \
     test/host/fakes/terminal_port_fake.c firmware/settings.c
 test_motion_syntax_SRCS := firmware/cli/motion_syntax.c firmware/cli/range.c firmware/base/flash.c firmware/base/number.c firmware/queue/session.c \
@@ -107,7 +109,7 @@ test_commands_SRCS := $(CLI_SRCS)
 test_configure_SRCS := $(CLI_SRCS)
 test_display_SRCS := $(CLI_SRCS)
 test_trial_SRCS := firmware/cli/trial.c $(STORE_SRCS) test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
-test_terminal_SRCS := $(CLI_SRCS) firmware/cli/terminal.c firmware/cli/line.c firmware/base/status.c
+test_terminal_SRCS := $(CLI_SRCS)
 test_fuzz_SRCS := $(test_terminal_SRCS)
 test_fuzz_HOST_SRCS := test/fuzz/grammar.c test/fuzz/reference.c
 test_boot_SRCS := firmware/boot.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c

@@ -299,7 +299,7 @@ bool network_show(void)
     if (!begun) {
         begun = true;
         switch (*shown) {
-        case PACKET_NAK: text_put_flash(FLASH_TEXT("NA")); /* and: */
+        case PACKET_NAK: text_put_flash(FLASH_TEXT("NA")); /* fall through */
         case PACKET_ACK:
             terminal_port_put('K');
             if (*++shown != '\0') {

@@ -3,6 +3,7 @@
 #include "cli/range.h"
 #include <string.h>
 #include "cli/display.h"
+#include "cli/network.h"
 #include "host/fakes/engine_fake.h"
 #include "host/fakes/terminal_port_fake.h"
 #include "queue/queue.h"
@@ -14,6 +15,7 @@ void setUp(void)
     terminal_port_fake_reset();
     engine_fake_reset();
     commands_init();
+    network_init();
     queue_init();
     display_init();
 }
@@ -290,11 +292,26 @@ static void test_a_wrong_ramp_number_is_refused_with_the_range(void)
     TEST_ASSERT_EQUAL_MEMORY(&before, &session, sizeof before);
 }
 
-/* TRM-006 */
-static void test_a_line_that_begins_with_a_number_is_not_executed(void)
+/* NET-009, NET-015: what is sent, and when, is shown by test_network.c. */
+static void test_a_line_with_an_address_is_not_executed_here(void)
 {
-    assert_refused(STATUS_NOT_YET, "85m200");
-    assert_refused(STATUS_NOT_YET, "0");
+    assert_refused(STATUS_WAIT, "86m200"); /* the bus has been silent for no time at all */
+    assert_refused(STATUS_WAIT, "0m200");
+    assert_refused(STATUS_SYNTAX, "0");
+    assert_refused(STATUS_SYNTAX, "85");
+    assert_refused(STATUS_RANGE, "256m200");
+    assert_refused(STATUS_NUMBER_TOO_LARGE, "99999999999m200");
+    assert_refused(STATUS_NOBODY, "/m200");
+    assert_refused(STATUS_NOBODY, "\\m200");
+}
+
+/* NET-010, A-NET-08 */
+static void test_a_line_with_the_own_address_is_executed_here(void)
+{
+    TEST_ASSERT_EQUAL(STATUS_OK, execute("85m300v50"));
+    TEST_ASSERT_EQUAL_UINT(1, engine_fake.submitted_count);
+    TEST_ASSERT_EQUAL_UINT32(300, engine_fake.submitted[0].count);
+    assert_refused(STATUS_SYNTAX, "85m200k");
 }
 
 /* OPS-006, SYS-006, SYS-007, SYS-013 */
@@ -520,7 +537,8 @@ int main(void)
     RUN_TEST(test_case_matters_where_the_manual_says_so);
     RUN_TEST(test_each_wrong_line_is_refused_and_changes_nothing);
     RUN_TEST(test_a_wrong_ramp_number_is_refused_with_the_range);
-    RUN_TEST(test_a_line_that_begins_with_a_number_is_not_executed);
+    RUN_TEST(test_a_line_with_an_address_is_not_executed_here);
+    RUN_TEST(test_a_line_with_the_own_address_is_executed_here);
     RUN_TEST(test_options_of_the_session_are_switched);
     RUN_TEST(test_loops_are_set_up_by_l_and_a_letter);
     RUN_TEST(test_xref_executes_entries_and_its_array);

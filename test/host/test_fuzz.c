@@ -5,6 +5,7 @@
  *   - a line that was refused has changed nothing, its error is one of the table, and there is only one
  *   - a line that was taken has changed only what such a command may change; motion commands exactly what was typed
  *   - a pulse was asked for only by + or -, the engine only by a motion command that was taken
+ *   - a line with an address is sent, and answered by nobody; with the unit's own it is executed here
  *   - a line that waits for what is being stored is executed when that is written
  *   - the settings as they are stored are those that were typed, the snapshot of the queue is the queue
  *
@@ -20,11 +21,13 @@
 #include <unistd.h>
 #include "base/status.h"
 #include "cli/commands.h"
+#include "cli/network.h"
 #include "cli/terminal.h"
 #include "cli/terminal_port.h"
 #include "eeprom/store.h"
 #include "fuzz/grammar.h"
 #include "fuzz/reference.h"
+#include "host/fakes/bus_port_fake.h"
 #include "host/fakes/eeprom_port_fake.h"
 #include "host/fakes/engine_fake.h"
 #include "host/fakes/terminal_port_fake.h"
@@ -397,6 +400,7 @@ static bool poll_once(void)
         settings_changed = true;
         commands_init(); /* as boot_restart() does */
     }
+    worked |= network_poll();
     worked |= end_what_was_asked();
     worked |= encoder_poll();
     worked |= queue_poll();
@@ -407,14 +411,24 @@ static bool poll_once(void)
     return worked;
 }
 
+/* In these rounds the bus becomes free, and the answer of another node is given up. */
+enum { ROUND_US = 2000, SILENCE_ROUNDS = 2, NO_ANSWER_ROUNDS = 60 };
+
 /* Until all has been said and done. */
 static void rest(void)
 {
     unsigned rounds = 0;
     const uint8_t places = 31;
+    unsigned quiet = SILENCE_ROUNDS; /* so many more with nothing to do */
+    static unsigned begins;
     terminal_port_fake_drain(places);
-    while (poll_once() || terminal_port_free() < places) {
+    while (poll_once() || terminal_port_free() < places || quiet-- > 0) {
         terminal_port_fake_drain(places);
+        timebase_fake_us += ROUND_US;
+        if (begins != bus_port_fake.begins) {
+            begins = bus_port_fake.begins;
+            quiet = NO_ANSWER_ROUNDS;
+        }
         if (++rounds > WAITING_ROUNDS && store_rests && store_busy()) {
             store_rests = false; /* a line waits for it */
             lines_waited++;
@@ -522,9 +536,11 @@ static void power_on(uint64_t seed)
     (void)store_load_settings();
     stored = settings;
     settings = chosen;
+    bus_port_fake_reset();
     commands_init();
     queue_init();
     terminal_init(STATUS_OK);
+    network_init();
     terminal_port_fake_type_byte(0); /* the line end before, if any, is forgotten */
     memset(&editor, 0, sizeof editor);
     rest();
@@ -634,6 +650,7 @@ static uint64_t lines_done, lines_taken;
 static void forget_what_was_said(void)
 {
     terminal_port_fake_reset();
+    bus_port_fake_clear();
 }
 
 /* What the engine is offered, or has begun, is this entry. */
@@ -752,6 +769,29 @@ static verdict_t judge_dollar(const char *text)
     }
 }
 
+typedef enum { HERE, TO_EVERYBODY, TO_A_NODE, NOWHERE } address_t;
+
+/* Which node a line is for; its own address is taken off. Nobody has sent a message that / could answer. */
+static address_t read_address(const char **line)
+{
+    const char *text = *line;
+    if (mode != MODE_COMMANDS || *text < '0' || *text > '9') {
+        return HERE;
+    }
+    unsigned node = 0;
+    for (; *text >= '0' && *text <= '9'; text++) {
+        node = node > 255 ? node : node * 10 + (unsigned)(*text - '0');
+    }
+    if (node > 255 || *text == '\0') {
+        return NOWHERE;
+    }
+    if (node == before.settings.device_id) {
+        *line = text;
+        return HERE;
+    }
+    return node == 0 ? TO_EVERYBODY : TO_A_NODE;
+}
+
 /* All commands but m, v, vc, a, d. */
 static verdict_t judge(const char *text)
 {
@@ -776,6 +816,8 @@ static verdict_t judge(const char *text)
     const bool two = !alone && is_end(text[2]); /* letters */
     switch (first) {
     case 'v': return verdict(second == 'd' && two);
+    case '+': /* behind the own address */
+    case '-':
     case 's':
     case 'n':
     case 'g':
@@ -783,7 +825,7 @@ static verdict_t judge(const char *text)
     case 'p':
     case '?': return verdict(alone);
     case 'y': return verdict(alone && text[0] == 'y');
-    case 'c': return verdict(two && (second == 'f' || second == 'c'));
+    case 'c': return verdict(two && (second == 'f' || second == 'c' || second == 'n' || second == 'z'));
     case 'q':
         if (two && second == 'p') {
             expected.mode = MODE_QUEUE;
@@ -945,8 +987,9 @@ static void check_line(void)
     const fuzz_mode_t mode_before = mode;
     undo.executing = before.executing == undo.position && undo.position != 0;
 
+    const address_t address = broken ? HERE : read_address(&text);
     reading_t reading;
-    read_t kind = broken || mode != MODE_COMMANDS ? READ_OTHER : reference_read(text, &before.session, &reading);
+    read_t kind = broken || mode != MODE_COMMANDS || address != HERE ? READ_OTHER : reference_read(text, &before.session, &reading);
     if ((kind == READ_MOTION || kind == READ_VALUE || kind == READ_OPEN) &&
         engine_check(&reading.command) != STATUS_OK) {
         kind = READ_REFUSED;
@@ -956,6 +999,7 @@ static void check_line(void)
         kind = READ_REFUSED;
     }
     const verdict_t must = broken ? MUST_BE_REFUSED
+                           : address != HERE   ? verdict(address == TO_EVERYBODY) /* nobody else answers */
                            : kind == READ_OTHER ? judge(text)
                                                 : verdict(kind != READ_REFUSED);
     if (kind == READ_OPEN) {
@@ -1043,6 +1087,12 @@ static edit_t next_byte(void)
     terminal_port_fake_type_byte(here.bytes[here.taken]);
     pulses_cw += edit == EDIT_PULSE_CW;
     pulses_ccw += edit == EDIT_PULSE_CCW;
+    if (edit == EDIT_ENDED && !editor.damaged && !editor.too_long) { /* with the own address they are lines */
+        const char *text = editor.text;
+        const bool addressed = read_address(&text) == HERE && text != editor.text && is_end(text[1]);
+        pulses_cw += addressed && *text == '+';
+        pulses_ccw += addressed && *text == '-';
+    }
     here.taken++;
     return edit;
 }
@@ -1121,6 +1171,7 @@ static bool is_harmless(const char *text)
 /* Lines after which another mode may be in force. */
 static bool changes_mode(const char *text)
 {
+    (void)read_address(&text);
     const char first = lower(text[0]), second = lower(text[0] == '\0' ? '\0' : text[1]);
     return ((first == 'q' || first == 'x') && second == 'p') || (first == '$' && (second == 'c' || text[1] == 'R')) ||
            (mode != MODE_COMMANDS && first == 'x');

@@ -10,6 +10,11 @@ uint32_t timebase_us(void)
     return timebase_fake_us;
 }
 
+uint16_t timebase_128us(void)
+{
+    return (uint16_t)(timebase_fake_us >> 7);
+}
+
 uint8_t timebase_32ms(void)
 {
     return (uint8_t)(timebase_fake_us >> 15);
