@@ -34,8 +34,8 @@ board_t *bus_crashed(const bus_t *bus); /* NULL: none */
 /* From now on the node's clock runs so much faster than it should, at most +-20 %. */
 void bus_skew(bus_t *bus, board_t *b, double percent);
 
-int bus_level(const bus_t *bus);           /* as it is heard */
-unsigned bus_drivers(const bus_t *bus);    /* how many drive it, peers included */
+int bus_level(const bus_t *bus);            /* as it is heard */
+unsigned bus_drivers(const bus_t *bus);     /* how many drive it, peers included */
 uint32_t bus_contentions(const bus_t *bus); /* how many times drivers began to disagree */
 
 /* From now on each bit time of a line that is driven is inverted with that probability, for all that hear it; the same
@@ -51,7 +51,7 @@ bus_peer_t *bus_peer(bus_t *bus, double baud); /* freed with the bus */
 void bus_peer_send(bus_peer_t *p, const void *bytes, size_t count);
 /* Drives 0 or 1 for so long, or nothing (-1): a gap. */
 void bus_peer_hold(bus_peer_t *p, int level, uint64_t cycles);
-void bus_peer_stop(bus_peer_t *p);                   /* releases the line and forgets what was planned */
+void bus_peer_stop(bus_peer_t *p);              /* releases the line and forgets what was planned */
 uint64_t bus_peer_free_at(const bus_peer_t *p); /* the end of all that is planned; in the past: nothing is */
 
 typedef struct {

@@ -718,6 +718,54 @@ class SerialPort(unittest.TestCase):
 
 
 @unittest.skipUnless(os.path.exists(FIRMWARE), f"{FIRMWARE} is not built")
+class Network(unittest.TestCase):
+    """Several boards on one line."""
+
+    def start(self, *arguments):
+        child = subprocess.Popen(
+            [SACSIM, "--nodes", "3", "--no-reset", *arguments, FIRMWARE],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+        )
+        self.addCleanup(child.wait)
+        self.addCleanup(child.terminate)
+        self.addCleanup(child.stdout.close)
+        ports = {}
+        reader = Reader(child.stdout.fileno())
+        for name in (b"node 10", b"node 11", b"node 12", b"bus"):
+            path = reader.expect(rb"sacsim: " + name + rb" (\S+)[^\n]*\n").group(1).decode()
+            port = SerialPort.open(path)
+            self.addCleanup(os.close, port.descriptor)
+            ports[name] = port
+        return child, ports
+
+    def test_each_node_answers_with_its_address_and_the_bus_disturbs_none(self):
+        link, eeprom = path_of("net"), path_of("net.eeprom")
+        for _ in range(2):  # the second time from the files
+            child, ports = self.start("--link", link, "--eeprom", eeprom)
+            time.sleep(1.5)  # boot
+            ports[b"bus"].send(b"\x55noise for all\r\n" * 5)
+            for address in (10, 11, 12):
+                port = ports[b"node %d" % address]
+                port.send(b"p\r")
+                port.expect(rb"p\r\n.*SAC>")
+                port.send(b"$C\r")
+                port.expect(rb"M d_id\t\t%d\t" % address)
+            self.assertTrue(os.path.islink(link + ".12") and os.path.islink(link + ".bus"))
+            ports[b"bus"].pump(0.1)
+            self.assertEqual(ports[b"bus"].seen, b"")  # not even its own echo
+            child.terminate()
+            self.assertEqual(child.wait(timeout=PATIENCE_S), -signal.SIGTERM)
+            self.assertFalse(os.path.lexists(link + ".10"))
+            self.assertEqual(os.path.getsize(eeprom + ".11"), 1024)
+
+    def test_what_several_nodes_cannot_do_is_refused(self):
+        done = run("--nodes", "3", "--edges", path_of("x.edges"), image=FIRMWARE)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn(b"--nodes: neither --edges", done.stderr)
+
+
+@unittest.skipUnless(os.path.exists(FIRMWARE), f"{FIRMWARE} is not built")
 class Firmware(unittest.TestCase):
     """The firmware itself."""
 

@@ -2,6 +2,7 @@
 #include <signal.h>
 
 #include "console.h"
+#include "network.h"
 #include "options.h"
 #include "session.h"
 
@@ -11,7 +12,7 @@ int main(int argc, char **argv)
     int code;
 
     options_parse(&options, argc, argv);
-    code = session_run(&options);
+    code = options.nodes > 0 ? network_run(&options) : session_run(&options);
     console_restore();
     if (code < 0) { /* end as the signal would have, so that a calling shell knows */
         signal(-code, SIG_DFL);

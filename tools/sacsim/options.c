@@ -16,6 +16,8 @@ enum {
     KEY_STEPS_PER_REV,
     KEY_MICROSTEPS,
     KEY_CW,
+    KEY_NODES,
+    KEY_BUS_BAUD,
 };
 
 const char *argp_program_version = "sacsim 1.0 - SAC's simulated Arduino Nano (ATmega328P, 16 MHz)";
@@ -49,6 +51,12 @@ static const struct argp_option options[] = {
     {"link", 'l', "PATH", 0, "With --pty: a symbolic link to it", 2},
     {"no-reset", KEY_NO_RESET, NULL, 0, "With --pty: opening the port does not reset the Nano, as it would a real one",
      2},
+    {NULL, 0, NULL, 0, "The network:", 2},
+    {"nodes", KEY_NODES, "N", 0,
+     "N Nanos (at most 16) on one RS485 line, with addresses from 10 on, each with a pseudo terminal, and one more for the "
+     "line. --link and --eeprom PATH then make PATH.10, PATH.11 and so on, and PATH.bus; no recording, wires or keys",
+     2},
+    {"bus-baud", KEY_BUS_BAUD, "BD", 0, "Bits per second of the line's pseudo terminal (default 38400)", 2},
     {NULL, 0, NULL, 0, "Recording:", 3},
     {"edges", 'e', "FILE", 0, "Write every edge with its cycle: FILE.csv as text, else compact (tools/edges.py)", 3},
     {"vcd", KEY_VCD, "FILE", 0, "Write a value change dump for GTKWave or sigrok", 3},
@@ -166,6 +174,9 @@ static void check(struct argp_state *state, const options_t *o)
     if (o->image == NULL) {
         argp_error(state, "which image? e.g. build/sac.elf");
     }
+    if (o->nodes > 0 && (o->edges != NULL || o->vcd != NULL || o->wire_count > 0)) {
+        argp_error(state, "--nodes: neither --edges nor --vcd nor --wire");
+    }
     if (!o->pty && o->link != NULL) {
         argp_error(state, "--link needs --pty");
     }
@@ -195,6 +206,11 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     case KEY_STEPS_PER_REV: o->steps_per_rev = whole(state, "--steps-per-rev", arg, 1, 100000); break;
     case KEY_MICROSTEPS: o->microsteps = whole(state, "--microsteps", arg, 1, 256); break;
     case KEY_CW: o->cw_level = (uint8_t)whole(state, "--cw", arg, 0, 1); break;
+    case KEY_NODES:
+        o->nodes = whole(state, "--nodes", arg, 1, OPTIONS_NODES_MAX);
+        o->pty = true;
+        break;
+    case KEY_BUS_BAUD: o->bus_baud = number(state, "--bus-baud", arg, 300, 1e6); break;
     case ARGP_KEY_ARG:
         if (o->image != NULL) {
             argp_error(state, "one image at a time: '%s' is one too many", arg);
@@ -213,6 +229,7 @@ void options_parse(options_t *o, int argc, char **argv)
 
     *o = (options_t){
         .baud = 38400,
+        .bus_baud = 38400,
         .linger_ms = 300,
         .reset_on_open = true,
         .pins = {post_find("clk"), post_find("dir")},

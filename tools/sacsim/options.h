@@ -19,7 +19,7 @@ enum {
     EXIT_CRASHED = 3, /* the image ran into an illegal instruction, out of flash or out of stack */
 };
 
-enum { OPTIONS_POSTS_MAX = 24, OPTIONS_WIRES_MAX = 8 };
+enum { OPTIONS_POSTS_MAX = 24, OPTIONS_WIRES_MAX = 8, OPTIONS_NODES_MAX = 16 };
 
 typedef struct {
     const char *image;
@@ -29,6 +29,8 @@ typedef struct {
     double linger_ms; /* simulated */
     bool pty;
     const char *link;
+    unsigned nodes;  /* on one RS485 line; 0: a single Nano without one */
+    double bus_baud; /* of the line's pseudo terminal */
     bool reset_on_open;
     const char *edges;
     const char *vcd;

@@ -5,6 +5,7 @@ SACSIM_SRCS := \
 	tools/sacsim/keys.c \
 	tools/sacsim/main.c \
 	tools/sacsim/meter.c \
+	tools/sacsim/network.c \
 	tools/sacsim/options.c \
 	tools/sacsim/pace.c \
 	tools/sacsim/posts.c \
