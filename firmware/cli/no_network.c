@@ -23,7 +23,7 @@ status_t network_send(uint8_t destination, const char *text)
 
 uint8_t network_last_origin(void)
 {
-    return 1;
+    return 0; /* no message comes */
 }
 
 bool network_show(void)
