@@ -43,6 +43,7 @@ FIRMWARE_SRCS := \
     firmware/hal/start.S \
     firmware/hal/timebase_isr.S \
     firmware/hal/usart_isr.S \
+    firmware/hal/soft_uart_isr.S \
     firmware/motion/ramp.c \
     firmware/motion/block.c \
     firmware/motion/block.S \
@@ -66,7 +67,7 @@ FIRMWARE_SRCS := \
     firmware/hal/pins.c \
     firmware/hal/reset.c \
     firmware/hal/timebase.c \
-    firmware/hal/usart.c \
+    firmware/hal/ports.c \
     $(NETWORK_SRCS_$(NETWORK)) \
     firmware/cli/line.c \
     firmware/cli/terminal.c \

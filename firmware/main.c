@@ -1,13 +1,11 @@
 /* Boot, then the polled loop: nothing else. */
 #include "base/atomic.h"
-#include "base/inline.h"
 #include "base/wake.h"
 #include "boot.h"
 #include "boot_port.h"
 #include "cli/commands.h"
 #include "cli/network.h"
 #include "cli/terminal.h"
-#include "cli/terminal_port.h"
 #include "cli/timebase_port.h"
 #include "cli/trial.h"
 #include "drivers.h"
@@ -15,6 +13,7 @@
 #include "motion/engine.h"
 #include "motion/estop_port.h"
 #include "pins_port.h"
+#include "ports_port.h"
 #include "queue/encoder.h"
 #include "queue/encoder_port.h"
 #include "queue/ops.h"
@@ -23,11 +22,6 @@
 
 static status_t snapshot; /* what became of the saved queue ... */
 static bool saved;        /* ... and whether there is one */
-
-static NOINLINE void ports_init(void)
-{
-    terminal_port_init(settings.hw_baud);
-}
 
 void boot_restart(void)
 {

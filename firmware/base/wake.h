@@ -14,6 +14,7 @@
 
 extern volatile uint8_t wake_flag;
 
-void wake_sleep(void); /* until the next interrupt, unless wake_flag is raised */
+/* Until the next interrupt, unless wake_flag is raised; the time base's own count every 1.024 ms only. */
+void wake_sleep(void);
 
 #endif

@@ -1,4 +1,4 @@
-/* The serial port that the terminal uses; implemented by hal/usart.c.
+/* The serial port that the terminal uses; implemented by hal/ports.c, set up by ports_init().
  *
  * Units:   bytes. Context: main loop.
  * Errors:  a lost or damaged byte is read as TERMINAL_PORT_DAMAGED in its place.
@@ -11,10 +11,8 @@
 
 #define TERMINAL_PORT_DAMAGED 0xFFu
 
-void terminal_port_init(uint32_t baud); /* 300..2,000,000; the nearest divisor is taken */
-
 int16_t terminal_port_get(void);     /* -1: nothing has arrived */
-uint8_t terminal_port_waiting(void); /* how many bytes have arrived and not been taken, 0..111 */
+uint8_t terminal_port_waiting(void); /* how many bytes have arrived and not been taken, 0..111 or 0..63 */
 
 /* What terminal_port_get() will return after so many others; only as long as none has been taken since boot. */
 uint8_t terminal_port_peek(uint8_t others);

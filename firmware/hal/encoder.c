@@ -13,7 +13,7 @@ void encoder_init(void)
     taken = pins ^ pins >> 1;
     encoder_edges = taken;
     PCMSK1 = ENCODER_PINS;
-    PCICR = _BV(PCIE1);
+    PCICR = _BV(PCIE1) | _BV(PCIE2); /* the software port's stays set */
 }
 
 int8_t encoder_take(void)

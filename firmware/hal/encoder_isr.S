@@ -1,6 +1,6 @@
 ; The encoder's interrupt: one edge on EnA or EnB, or several.
 ;
-; As the others it masks only itself (PCIE1, the only pin-change group in use), allows interrupts at once and does its work
+; As the others it masks only itself (PCIE1; the software port's PCIE2 stays set), allows interrupts at once and does its work
 ; interruptible; a change of the pins meanwhile leaves its flag, and calls it again. That comes before the step interrupt,
 ; whose number is higher: what is masked at the end and at the next beginning adds up, and must be less than 32 cycles.
 ;
@@ -22,7 +22,7 @@
 .global PCINT1_vect
 PCINT1_vect:
     push r24                    ; 9 cycles since the flag was raised
-    ldi  r24, 0                 ; 10
+    ldi  r24, 1 << PCIE2        ; 10
     sts  ADDRESS(PCICR), r24    ; 12
     sei                         ; 13
     in   r24, IO_SREG
@@ -47,7 +47,7 @@ none:
     pop  r25
     pop  r24
     out  IO_SREG, r24           ; interrupts stay allowed; nothing below changes flags
-    ldi  r24, 1 << PCIE1
+    ldi  r24, 1 << PCIE1 | 1 << PCIE2
     cli
     sts  ADDRESS(PCICR), r24    ; 2 cycles masked
     pop  r24                    ; 4

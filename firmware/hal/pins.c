@@ -22,10 +22,13 @@ void pins_init(void)
     BOARD_POSTS(POST)
 #undef POST
     port_c |= 1 << 2; /* OPSB, the inverse of OPSA */
-    port_d |= 1 << 1; /* an idle serial line is high */
+    port_d |= 1 << 1 | 1 << 6; /* idle serial lines are high */
     PORTB = port_b;
     PORTC = port_c;
     PORTD = port_d;
+    /* S/W Tx belongs to OC0A from the beginning; its latch is high before the pin drives (section 15.5.3). */
+    TCCR0A = 1 << COM0A1 | 1 << COM0A0;
+    TCCR0B = 1 << FOC0A;
     DDRB = ddr_b;
     DDRC = ddr_c;
     DDRD = ddr_d;

@@ -22,6 +22,8 @@ __vectors:
         jmp     INT1_vect
         .org    4 * PCINT1_vect_num
         jmp     PCINT1_vect
+        .org    4 * PCINT2_vect_num
+        jmp     PCINT2_vect
         .org    4 * WDT_vect_num        /* and of Timer2's and Timer1's but the overflow: */
 start:  clr     r1
         out     _SFR_IO_ADDR(SREG), r1
@@ -36,12 +38,18 @@ start:  clr     r1
         jmp     start_watchdog
         .org    4 * TIMER1_OVF_vect_num
         jmp     TIMER1_OVF_vect
+        .org    4 * TIMER0_COMPA_vect_num
+        jmp     TIMER0_COMPA_vect
+        .org    4 * TIMER0_COMPB_vect_num
+        jmp     TIMER0_COMPB_vect
         .org    4 * TIMER0_OVF_vect_num
         jmp     TIMER0_OVF_vect
         .org    4 * USART_RX_vect_num
         jmp     USART_RX_vect
         .org    4 * USART_UDRE_vect_num
         jmp     USART_UDRE_vect
+        .org    4 * USART_TX_vect_num
+        jmp     USART_TX_vect
 
         .global __do_clear_bss, main    /* the linker takes along what is named */
         .section .init3, "ax", @progbits

@@ -1,17 +1,17 @@
-/* Timer0 at clock / 64 (4 us), counted on by its overflow interrupt every 1.024 ms (timebase_isr.S): seldom enough to cost
- * nothing that matters, often enough for the main loop to be woken for the watchdog.
+/* Timer0 at clock / 8 (0.5 us, as fine as the software port needs it), counted on by its overflow interrupt every 128 us
+ * (timebase_isr.S). Each 8th overflow wakes the main loop (sleep.c).
  * Source: ATmega328P datasheet DS40002061, 15.7.1 (normal mode), 15.9. */
+#include "hal/timebase.h"
 #include <avr/io.h>
 #include "base/atomic.h"
 #include "cli/timebase_port.h"
 
-/* Written by the interrupt. */
 volatile uint32_t timebase_overflows;
 
 void timebase_start(void)
 {
-    TIMSK0 = _BV(TOIE0);
-    TCCR0B = _BV(CS01) | _BV(CS00);
+    TIMSK0 |= _BV(TOIE0); /* the software port may be about to send */
+    TCCR0B = _BV(CS01);
 }
 
 __attribute__((noinline)) uint16_t timebase_128us(void)
@@ -21,17 +21,16 @@ __attribute__((noinline)) uint16_t timebase_128us(void)
 
 uint8_t timebase_32ms(void)
 {
-    uint8_t state = atomic_begin();
-    const volatile uint8_t *overflows = (const volatile uint8_t *)&timebase_overflows;
-    uint8_t low = overflows[0];
-    uint8_t high = overflows[1];
-    atomic_end(state);
-    return (uint8_t)(high << 3 | low >> 5);
+    return (&TIMEBASE_OVERFLOWS_LOW)[1];
 }
 
 uint8_t timebase_262ms(void)
 {
-    return ((const volatile uint8_t *)&timebase_overflows)[1];
+    uint8_t state = atomic_begin();
+    const uint8_t low = (&TIMEBASE_OVERFLOWS_LOW)[1];
+    const uint8_t high = (&TIMEBASE_OVERFLOWS_LOW)[2];
+    atomic_end(state);
+    return (uint8_t)(high << 5 | low >> 3);
 }
 
 uint32_t timebase_us(void)
@@ -45,5 +44,5 @@ uint32_t timebase_us(void)
     if ((flags & _BV(TOV0)) != 0 && ticks < 128) {
         high++; /* overflowed, not yet counted */
     }
-    return (high << 8 | ticks) << 2;
+    return (high << 8 | ticks) >> 1 | (high >> 24 & 1) << 31;
 }

@@ -1,5 +1,5 @@
-; Counts the overflows of Timer0 for timebase.c. Interruptible from its first instruction: the next overflow is 16,384
-; cycles away.
+; Counts the overflows of Timer0 for timebase.c: 28 cycles every 2,048. Interruptible from its first instruction, because
+; it is over long before the next overflow.
 
 #include <avr/io.h>
 
@@ -13,21 +13,27 @@ TIMER0_OVF_vect:
     push r24
     in   r24, IO_SREG
     push r24
-    push r30
-    push r31
-    ldi  r30, lo8(timebase_overflows)
-    ldi  r31, hi8(timebase_overflows)
-next:
-    ld   r24, Z
+    lds  r24, timebase_overflows
     inc  r24
-    st   Z+, r24
-    brne counted                ; no carry into the next byte
-    cpi  r30, lo8(timebase_overflows + 4)
-    brne next
+    sts  timebase_overflows, r24
+    breq carry
 counted:
-    pop  r31
-    pop  r30
     pop  r24
     out  IO_SREG, r24
     pop  r24
     reti
+
+carry:
+    push r30
+    push r31
+    ldi  r30, lo8(timebase_overflows + 1)
+    ldi  r31, hi8(timebase_overflows + 1)
+1:  ld   r24, Z
+    inc  r24
+    st   Z+, r24
+    brne 2f
+    cpi  r30, lo8(timebase_overflows + 4)
+    brne 1b
+2:  pop  r31
+    pop  r30
+    rjmp counted

@@ -1,39 +1,44 @@
-; The two interrupts of USART0.
+; The interrupts of USART0: receive, transmit, and the end of the network's packet.
 ;
-; A step interrupt may be due every 32 cycles, and Estop and sync at any moment, so these mask only themselves (RXCIE0 and
-; UDRIE0 alike), allow interrupts at once and do their work interruptible. Both flags would otherwise call the interrupt
+; A step interrupt may be due every 32 cycles, and Estop and sync at any moment, so these mask only themselves (RXCIE0,
+; UDRIE0 and TXCIE0 alike), allow interrupts at once and do their work interruptible. Both flags would otherwise call the interrupt
 ; again at once: they stay raised until the data register was read or written.
 ;
 ;   flag raised to `sei`     13 cycles with interrupts masked (entry 4, vector jump 3, 6 here)
 ;   `cli` to end of `reti`   9 cycles masked
 ;   whole run                receive 78 cycles (overrun 102), transmit 77
 ;
-; What UCSR0B is afterwards follows from the transmit ring alone: UDRIE0 is set unless that is empty. So nobody has to
-; read it, and usart.c may write it at any time.
-; Shared: usart.h says who writes which index.
+; What UCSR0B is afterwards follows from the transmit ring alone: UDRIE0 is set unless that is empty; the rest is
+; usart_control. So nobody has to read it, and ports.c may write it at any time.
+; Shared: ports.h says who writes which index.
 ; Source: ATmega328P datasheet DS40002061, 20.7.3 (receiver error flags: read UCSR0A before UDR0), 20.11.3.
 
 #include <avr/io.h>
-#include "hal/usart.h"
+#include "hal/ports.h"
 
 #define ADDRESS(name) _SFR_MEM_ADDR(name)
 #define IO_SREG _SFR_IO_ADDR(SREG)
 
 ; Z: the receive ring's next free slot, r25: the head after it; to `full` if there is none. r24 is left alone.
 .macro FREE_SLOT
-    lds  r30, usart_rx_head
+    lds  r30, usart_port + PORT_RX_HEAD
     mov  r25, r30
     inc  r25
     cpi  r25, USART_RX_BYTES
     brne . + 2                  ; over the next instruction
     ldi  r25, 0
-    lds  r31, usart_rx_tail
+    lds  r31, usart_port + PORT_RX_TAIL
     cp   r25, r31
     breq full
     ldi  r31, 0
-    subi r30, lo8(-(usart_rx_bytes))
-    sbci r31, hi8(-(usart_rx_bytes))
+    subi r30, lo8(-(usart_port + PORT_RX))
+    sbci r31, hi8(-(usart_port + PORT_RX))
 .endm
+
+.section .bss
+
+.global usart_port
+usart_port: .skip PORT_RX + USART_RX_BYTES
 
 .section .text
 
@@ -43,10 +48,10 @@
     sts  ADDRESS(UCSR0B), r24   ; 12
     sei                         ; 13
     in   r24, IO_SREG
-    push r24
     push r25
     push r30
     push r31
+    push r24
 .endm
 
 ; -- receive ----------------------------------------------------------------------------------------------------------
@@ -61,53 +66,62 @@ USART_RX_vect:
 good:
     FREE_SLOT
     st   Z, r24
-    sts  usart_rx_head, r25
+    sts  usart_port + PORT_RX_HEAD, r25
     ldi  r24, 1
     sts  wake_flag, r24
 done:
-    lds  r25, usart_tx_tail
-    lds  r24, usart_tx_head
+    lds  r25, usart_port + PORT_TX_TAIL
+    lds  r24, usart_port + PORT_TX_HEAD
     cp   r24, r25
+    lds  r24, usart_control
+    breq . + 2                  ; over the next instruction
+    ori  r24, 1 << UDRIE0
+    pop  r25
+    out  IO_SREG, r25           ; nothing below changes flags
     pop  r31
     pop  r30
-    pop  r25
-    pop  r24                    ; SREG
-    brne more
-    out  IO_SREG, r24
-    ldi  r24, USART_CONTROL | (1 << RXCIE0)
-leave:                          ; cycles masked
+    pop  r25                    ; cycles masked
     cli
     sts  ADDRESS(UCSR0B), r24   ; 2
     pop  r24                    ; 4
     reti                        ; 8
-more:
-    out  IO_SREG, r24
-    ldi  r24, USART_CONTROL | (1 << RXCIE0) | (1 << UDRIE0)
-    rjmp leave
 
-; In a full ring the newest byte becomes USART_DAMAGED: the main loop cannot be reading that one.
+; One more in a counter that stays at 255.
+.macro COUNT counter
+    lds  r25, usart_port + \counter
+    inc  r25
+    brne . + 2                  ; over the next instruction
+    dec  r25
+    sts  usart_port + \counter, r25
+.endm
+
+; In a full ring the newest byte becomes PORT_DAMAGED: the main loop cannot be reading that one.
 full:
     subi r30, 1
     brcc . + 2                  ; over the next instruction
     ldi  r30, USART_RX_BYTES - 1
     ldi  r31, 0
-    subi r30, lo8(-(usart_rx_bytes))
-    sbci r31, hi8(-(usart_rx_bytes))
-    ldi  r24, USART_DAMAGED
+    subi r30, lo8(-(usart_port + PORT_RX))
+    sbci r31, hi8(-(usart_port + PORT_RX))
+    ldi  r24, PORT_DAMAGED
     st   Z, r24
+    COUNT PORT_OVERRUNS
     rjmp done
 
-; Bytes were lost before this one (overrun): USART_DAMAGED goes before it. Or this one is not what was sent (framing
-; error): USART_DAMAGED goes in its place, because the byte itself might read as the end of a line and set the rest of
+; Bytes were lost before this one (overrun): PORT_DAMAGED goes before it. Or this one is not what was sent (framing
+; error): PORT_DAMAGED goes in its place, because the byte itself might read as the end of a line and set the rest of
 ; the line free to be executed.
 damaged:
-    sbrc r25, FE0
-    ldi  r24, USART_DAMAGED
-    sbrc r25, FE0
+    sbrs r25, FE0
+    rjmp lost
+    ldi  r24, PORT_DAMAGED
+    COUNT PORT_FRAMING
     rjmp good
+lost:
+    COUNT PORT_OVERRUNS
     FREE_SLOT
-    sts  usart_rx_head, r25
-    ldi  r25, USART_DAMAGED
+    sts  usart_port + PORT_RX_HEAD, r25
+    ldi  r25, PORT_DAMAGED
     st   Z, r25
     rjmp good
 
@@ -117,20 +131,28 @@ damaged:
 .global USART_UDRE_vect
 USART_UDRE_vect:
     ENTER
-    lds  r25, usart_tx_tail
-    lds  r24, usart_tx_head
+    lds  r25, usart_port + PORT_TX_TAIL
+    lds  r24, usart_port + PORT_TX_HEAD
     cp   r24, r25
     brne . + 2                  ; over the next instruction
     rjmp done
     mov  r30, r25
     ldi  r31, 0
-    subi r30, lo8(-(usart_tx_bytes))
-    sbci r31, hi8(-(usart_tx_bytes))
+    subi r30, lo8(-(usart_port + PORT_TX))
+    sbci r31, hi8(-(usart_port + PORT_TX))
     ld   r30, Z
     sts  ADDRESS(UDR0), r30
     inc  r25
-    andi r25, USART_TX_BYTES - 1
-    sts  usart_tx_tail, r25
+    andi r25, PORT_TX_BYTES - 1
+    sts  usart_port + PORT_TX_TAIL, r25
     ldi  r30, 1
     sts  wake_flag, r30
     rjmp done
+
+; -- the end of the network's packet ----------------------------------------------------------------------------------
+
+; Enabled once bus_port_end() has said that no byte follows: Tx En falls.
+.global USART_TX_vect
+USART_TX_vect:
+    cbi  _SFR_IO_ADDR(PORTD), PORT_TX_EN
+    reti

@@ -1,4 +1,4 @@
-/* The pins OPSA and OPSB, and the terminal port for soft ops; implemented by hal/pins.c and hal/usart.c.
+/* The pins OPSA and OPSB, and the terminal port for soft ops; implemented by hal/pins.c and hal/ports.c.
  *
  * Context: main loop. Tests: test/host/test_ops.c with a fake; test/image/test_image_ops.c. */
 #ifndef QUEUE_OPS_PORT_H

@@ -1,0 +1,261 @@
+/* Both serial ports, USART0 and the software port: rings between the main loop and the interrupts of usart_isr.S and
+ * soft_uart_isr.S. One is the terminal's, the other one the network's.
+ * Source: ATmega328P datasheet DS40002061, sections 15 (Timer0) and 20 (USART). */
+#include "hal/ports.h"
+#include <avr/io.h>
+#include <stddef.h>
+#include "base/atomic.h"
+#include "base/inline.h"
+#include "cli/terminal_port.h"
+#include "cli/timebase_port.h"
+#include "hal/baud.h"
+#include "net/bus_port.h"
+#include "ports_port.h"
+#include "queue/ops_port.h"
+#include "settings.h"
+
+_Static_assert(TERMINAL_PORT_DAMAGED == PORT_DAMAGED, "the terminal knows a damaged byte by this value");
+_Static_assert(offsetof(port_t, rx) == PORT_RX && offsetof(port_t, overruns) == PORT_OVERRUNS, "as in ports.h");
+_Static_assert(sizeof soft_uart == SOFT_PORT + PORT_RX, "as in ports.h");
+
+#define LONGEST_INTERVAL (170u << 8)
+
+volatile uint8_t usart_control;
+static uint8_t network;    /* as the setting was when the ports were set up */
+static uint16_t begun_us; /* when Tx En has risen */
+
+/* The port's registers as they lie in the memory (datasheet, register summary). */
+typedef struct {
+    uint8_t status_a, control_b, control_c, reserved;
+    uint16_t divisor;
+} usart_t;
+
+static NOINLINE port_t *port_of(uint8_t hardware)
+{
+    return hardware ? &usart_port : &soft_uart.port;
+}
+
+#define TERMINAL port_of(!network)
+#define BUS port_of(network)
+
+/* -- rates and roles ----------------------------------------------------------------------------------------------- */
+
+static void usart_init(void)
+{
+    const baud_divisor_t divisor = baud_divisor(settings.hw_baud);
+    const uint8_t u2x = (uint8_t)(divisor.u2x << U2X0);
+    volatile usart_t *usart = (volatile usart_t *)&UCSR0A;
+    NEAR(usart);
+    if (usart->divisor == divisor.ubrr && ((usart->status_a ^ u2x) & _BV(U2X0)) == 0 && usart->control_b != 0) {
+        return; /* as it is: a write would spoil what is being received */
+    }
+    usart->status_a = u2x;
+    usart->divisor = divisor.ubrr;
+    usart->control_c = _BV(UCSZ01) | _BV(UCSZ00); /* 8 data bits, no parity, 1 stop bit */
+}
+
+static void soft_init(void)
+{
+    uint32_t interval = 16 * BOARD_CPU_HZ * 2 / settings.sw_baud;
+    uint8_t intervals = 1;
+    while (interval > LONGEST_INTERVAL) {
+        interval >>= 1;
+        intervals = (uint8_t)(intervals << 1);
+    }
+    const uint8_t state = atomic_begin();
+    soft_uart.interval = (uint16_t)interval;
+    soft_uart.intervals = intervals;
+    atomic_end(state);
+}
+
+static void usart_enable(uint8_t ended)
+{
+    usart_control = USART_CONTROL | _BV(RXCIE0) | ended;
+    UCSR0B = usart_control | _BV(UDRIE0); /* output may be under way; if not, it is masked again */
+}
+
+void ports_init(void)
+{
+    usart_init();
+    soft_init();
+    if (network != settings.network) {
+        network = settings.network;
+        usart_port.rx_tail = usart_port.rx_head; /* it was meant for another */
+        soft_uart.port.rx_tail = soft_uart.port.rx_head;
+        soft_uart.ended = 0;
+        usart_control = 0;
+        PORTD &= (uint8_t)~_BV(PORT_TX_EN);
+    }
+    usart_enable(usart_control & _BV(TXCIE0));
+    if (PCMSK2 == 0 && (TIMSK0 & _BV(OCIE0B)) == 0) {
+        PCMSK2 = _BV(PORT_SW_RX); /* at boot; then it is the interrupts' */
+    }
+}
+
+/* -- rings --------------------------------------------------------------------------------------------------------- */
+
+static NOINLINE int16_t get(port_t *port)
+{
+    const uint8_t tail = port->rx_tail;
+    if (tail == port->rx_head) {
+        return -1;
+    }
+    const uint8_t byte = port->rx[tail];
+    uint8_t next = (uint8_t)(tail + 1);
+    if (next == (port == &usart_port ? USART_RX_BYTES : SOFT_RX_BYTES)) {
+        next = 0;
+    }
+    port->rx_tail = next;
+    return byte;
+}
+
+static uint8_t free_places(const port_t *port)
+{
+    return (uint8_t)((port->tx_tail - port->tx_head - 1) & (PORT_TX_BYTES - 1));
+}
+
+static bool soft_sends(void)
+{
+    return (TIMSK0 & _BV(OCIE0A)) != 0;
+}
+
+static NOINLINE void put(port_t *port, uint8_t byte)
+{
+    if (port == &usart_port) {
+        UCSR0A = (uint8_t)((UCSR0A & _BV(U2X0)) | _BV(TXC0)); /* cleared, until this one is out (20.11.2) */
+    }
+    const uint8_t head = port->tx_head;
+    port->tx[head] = byte;
+    port->tx_head = (uint8_t)((head + 1) & (PORT_TX_BYTES - 1));
+    if (port == &usart_port) {
+        UCSR0B = usart_control | _BV(UDRIE0);
+    } else if (!soft_sends()) {
+        /* The first match, at once, leaves the line high; the start bit comes a bit later. */
+        soft_uart.tx_intervals = 1;
+        soft_uart.tx_bits = SOFT_TX_LAST;
+        const uint8_t state = atomic_begin();
+        OCR0A = (uint8_t)(TCNT0 + 3);
+        TIFR0 = _BV(OCF0A);
+        TIMSK0 |= _BV(OCIE0A);
+        atomic_end(state);
+    }
+}
+
+/* -- the terminal's ------------------------------------------------------------------------------------------------ */
+
+int16_t terminal_port_get(void)
+{
+    return get(TERMINAL);
+}
+
+uint8_t terminal_port_waiting(void)
+{
+    const port_t *port = TERMINAL;
+    const int8_t waiting = (int8_t)(port->rx_head - port->rx_tail);
+    return (uint8_t)(waiting >= 0 ? waiting : waiting + (network ? SOFT_RX_BYTES : USART_RX_BYTES));
+}
+
+uint8_t terminal_port_free(void)
+{
+    return free_places(TERMINAL);
+}
+
+uint8_t terminal_port_peek(uint8_t others)
+{
+    return TERMINAL->rx[others];
+}
+
+bool terminal_port_idle(void)
+{
+    if (network) {
+        return !soft_sends();
+    }
+    return usart_port.tx_tail == usart_port.tx_head && (UCSR0A & _BV(TXC0)) != 0;
+}
+
+void terminal_port_put(uint8_t byte)
+{
+    put(TERMINAL, byte);
+}
+
+void ops_port_send(uint8_t byte)
+{
+    if (terminal_port_free() != 0) {
+        terminal_port_put(byte);
+    }
+}
+
+/* -- the network's ------------------------------------------------------------------------------------------------- */
+
+int16_t bus_port_get(void)
+{
+    return get(BUS);
+}
+
+void bus_port_begin(void)
+{
+    if (network) {
+        usart_enable(0);
+    }
+    soft_uart.ended = 0;
+    PORTD |= _BV(PORT_TX_EN);
+    begun_us = (uint16_t)timebase_us();
+}
+
+/* The software port begins with an idle bit of its own, USART0 does not. */
+uint8_t bus_port_free(void)
+{
+    if (network && (uint16_t)((uint16_t)timebase_us() - begun_us) <= bus_port_character_us() / 8) {
+        return 0;
+    }
+    return free_places(BUS);
+}
+
+void bus_port_put(uint8_t byte)
+{
+    put(BUS, byte);
+}
+
+void bus_port_end(void)
+{
+    if (network) {
+        usart_enable(_BV(TXCIE0));
+        return;
+    }
+    const uint8_t state = atomic_begin();
+    soft_uart.ended = 1;
+    if (!soft_sends()) {
+        PORTD &= (uint8_t)~_BV(PORT_TX_EN);
+    }
+    atomic_end(state);
+}
+
+bool bus_port_sending(void)
+{
+    return (PORTD & _BV(PORT_TX_EN)) != 0;
+}
+
+uint16_t bus_port_character_us(void)
+{
+    if (network) {
+        return (uint16_t)((UBRR0 + 1) * ((UCSR0A & _BV(U2X0)) != 0 ? 5u : 10u));
+    }
+    return (uint16_t)(((uint32_t)soft_uart.interval * 5 * soft_uart.intervals >> 8) + 1);
+}
+
+uint8_t bus_port_framing_errors(void)
+{
+    return BUS->framing;
+}
+
+uint8_t bus_port_overruns(void)
+{
+    return BUS->overruns;
+}
+
+void bus_port_clear(void)
+{
+    port_t *port = BUS;
+    port->framing = 0;
+    port->overruns = 0;
+}
