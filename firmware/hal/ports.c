@@ -59,7 +59,7 @@ static void soft_init(void)
     uint32_t interval = 16 * BOARD_CPU_HZ * 2 / settings.sw_baud;
     uint8_t intervals = 1;
     while (interval > LONGEST_INTERVAL) {
-        interval >>= 1;
+        interval = (interval + 1) >> 1;
         intervals = (uint8_t)(intervals << 1);
     }
     const uint8_t state = atomic_begin();
