@@ -22,7 +22,7 @@ _Static_assert(sizeof soft_uart == SOFT_PORT + PORT_RX, "as in ports.h");
 
 volatile uint8_t usart_control;
 static uint8_t network;    /* as the setting was when the ports were set up */
-static uint16_t begun_us; /* when Tx En has risen */
+static uint16_t begun_128us; /* when Tx En has risen */
 
 /* The port's registers as they lie in the memory (datasheet, register summary). */
 typedef struct {
@@ -59,7 +59,7 @@ static void soft_init(void)
     uint32_t interval = 16 * BOARD_CPU_HZ * 2 / settings.sw_baud;
     uint8_t intervals = 1;
     while (interval > LONGEST_INTERVAL) {
-        interval >>= 1;
+        interval = (interval + 1) >> 1;
         intervals = (uint8_t)(intervals << 1);
     }
     const uint8_t state = atomic_begin();
@@ -199,13 +199,13 @@ void bus_port_begin(void)
     }
     soft_uart.ended = 0;
     PORTD |= _BV(PORT_TX_EN);
-    begun_us = (uint16_t)timebase_us();
+    begun_128us = timebase_128us();
 }
 
 /* The software port begins with an idle bit of its own, USART0 does not. */
 uint8_t bus_port_free(void)
 {
-    if (network && (uint16_t)((uint16_t)timebase_us() - begun_us) <= bus_port_character_us() / 8) {
+    if (network && (uint16_t)(timebase_128us() - begun_128us) <= bus_port_characters_128us(1) / 8 + 1) {
         return 0;
     }
     return free_places(BUS);
@@ -235,12 +235,13 @@ bool bus_port_sending(void)
     return (PORTD & _BV(PORT_TX_EN)) != 0;
 }
 
-uint16_t bus_port_character_us(void)
+uint16_t bus_port_characters_128us(uint8_t characters)
 {
+    uint32_t bit = (uint32_t)soft_uart.interval * soft_uart.intervals; /* in 1/32 cycles */
     if (network) {
-        return (uint16_t)((UBRR0 + 1) * ((UCSR0A & _BV(U2X0)) != 0 ? 5u : 10u));
+        bit = (uint32_t)(UBRR0 + 1) << ((UCSR0A & _BV(U2X0)) != 0 ? 8 : 9);
     }
-    return (uint16_t)(((uint32_t)soft_uart.interval * 5 * soft_uart.intervals >> 8) + 1);
+    return (uint16_t)((bit * 10 * characters >> 16) + 1);
 }
 
 uint8_t bus_port_framing_errors(void)

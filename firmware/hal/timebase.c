@@ -4,6 +4,7 @@
 #include "hal/timebase.h"
 #include <avr/io.h>
 #include "base/atomic.h"
+#include "base/inline.h"
 #include "cli/timebase_port.h"
 
 volatile uint32_t timebase_overflows;
@@ -14,9 +15,12 @@ void timebase_start(void)
     TCCR0B = _BV(CS01);
 }
 
-__attribute__((noinline)) uint16_t timebase_128us(void)
+NOINLINE uint16_t timebase_128us(void)
 {
-    uint8_t state = atomic_begin(); const uint16_t r = (uint16_t)timebase_overflows; atomic_end(state); return r;
+    const uint8_t state = atomic_begin();
+    const uint16_t overflows = (uint16_t)timebase_overflows;
+    atomic_end(state);
+    return overflows;
 }
 
 uint8_t timebase_32ms(void)
