@@ -26,13 +26,8 @@ void bus_port_end(void);
 /* Tx En is high. What arrives meanwhile may be the port's own echo. */
 bool bus_port_sending(void);
 
-<<<<<<< HEAD
 /* How long so many characters of 10 bits last, in units of 128 us, rounded up: 3 for one at 38,400 Bd. */
 uint16_t bus_port_characters_128us(uint8_t characters);
-=======
-/* How long a character lasts, 10 bits, rounded up: at 38,400 Bd 260 of USART0, 261 of the software port. */
-uint16_t bus_port_character_us(void);
->>>>>>> 52027801d9f0f3effa717e1f2a6d5a47121d6560
 
 /* Of the network's port since bus_port_clear(); they stay at 255. */
 uint8_t bus_port_framing_errors(void);
