@@ -949,7 +949,7 @@ static void take_next(void)
 /* The first interval of most profiles is long, whatever the rest turns out to be: then the first pulse need not wait for
  * the planning. Returns the state it belongs to if it is surely longer than the silence that planning takes, from few
  * operations, otherwise MOTION_STANDBY. */
-static NOINLINE motion_state_t certain_state(void)
+static motion_state_t certain_state(void)
 {
     const motion_command_t *c = &command;
     NEAR(c);
