@@ -84,7 +84,7 @@ FIRMWARE_SRCS := \
 # needed on the host alone, and assembler on the AVR alone.
 
 HOST_TESTS := test_number test_status test_baud test_line test_settings test_store test_session test_queue \
-    test_encoder test_ops test_motion_syntax test_commands test_configure test_display test_trial test_terminal test_packet test_fuzz test_boot test_drivers \
+    test_encoder test_ops test_motion_syntax test_commands test_configure test_display test_trial test_terminal test_packet test_network test_fuzz test_boot test_drivers \
     test_wide test_block test_ramp test_profile test_engine test_property_planner test_processor_model
 FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 STORE_SRCS := firmware/eeprom/store.c firmware/base/crc16.c firmware/settings.c test/host/fakes/eeprom_port_fake.c
@@ -111,6 +111,7 @@ test_display_SRCS := $(CLI_SRCS)
 test_trial_SRCS := firmware/cli/trial.c $(STORE_SRCS) test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 test_terminal_SRCS := $(CLI_SRCS)
 test_packet_SRCS := firmware/net/packet.c
+test_network_SRCS := $(CLI_SRCS)
 test_fuzz_SRCS := $(test_terminal_SRCS)
 test_fuzz_HOST_SRCS := test/fuzz/grammar.c test/fuzz/reference.c
 test_boot_SRCS := firmware/boot.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
