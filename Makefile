@@ -87,7 +87,7 @@ FIRMWARE_SRCS := \
 # needed on the host alone, and assembler on the AVR alone.
 
 HOST_TESTS := test_number test_status test_baud test_line test_settings test_store test_session test_queue \
-    test_encoder test_ops test_motion_syntax test_commands test_configure test_display test_trial test_terminal test_fuzz test_boot test_drivers \
+    test_encoder test_ops test_motion_syntax test_commands test_configure test_display test_trial test_terminal test_packet test_network test_fuzz test_boot test_drivers \
     test_wide test_block test_ramp test_profile test_engine test_property_planner test_processor_model
 FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 STORE_SRCS := firmware/eeprom/store.c firmware/base/crc16.c firmware/settings.c test/host/fakes/eeprom_port_fake.c
@@ -113,6 +113,8 @@ test_configure_SRCS := $(CLI_SRCS)
 test_display_SRCS := $(CLI_SRCS)
 test_trial_SRCS := firmware/cli/trial.c $(STORE_SRCS) test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 test_terminal_SRCS := $(CLI_SRCS)
+test_packet_SRCS := firmware/net/packet.c
+test_network_SRCS := $(CLI_SRCS)
 test_fuzz_SRCS := $(test_terminal_SRCS)
 test_fuzz_HOST_SRCS := test/fuzz/grammar.c test/fuzz/reference.c
 test_boot_SRCS := firmware/boot.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
@@ -385,6 +387,15 @@ $(BUILD)/fuzz: test/host/test_fuzz.c $(test_fuzz_SRCS) $(test_fuzz_HOST_SRCS) $(
 fuzz-long: ## 10^8 damaged lines into the terminal on this machine; SAC_FUZZ_SEED=n makes others, SAC_FUZZ_LINES=n fewer
 	@$(MAKE) -s --no-print-directory $(BUILD)/fuzz
 	@SAC_FUZZ_LINES=$${SAC_FUZZ_LINES:-100000000} $(BUILD)/fuzz
+
+$(BUILD)/packets: test/host/test_packet.c $(test_packet_SRCS) $(BUILD)/unity.o $(HOST_HEADERS) Makefile
+	$(call say,CC  $@)
+	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O2 -flto $(UNITY_FLAGS) $(TEST_INCLUDES) -o $@ $(filter %.c %.o,$^) -lm
+
+.PHONY: test-packet-long
+test-packet-long: ## all errors of 1, 2 and 3 bits in 200 packets of the network (some minutes); SAC_PACKETS=n makes others
+	@$(MAKE) -s --no-print-directory $(BUILD)/packets
+	@SAC_PACKETS=$${SAC_PACKETS:-200} $(BUILD)/packets
 
 .PHONY: fuzz-image-long
 fuzz-image-long: ## 10^5 damaged lines at the image on the board; SAC_FUZZ_SEED=n makes others, SAC_FUZZ_LINES=n fewer
