@@ -179,9 +179,11 @@ static void test_a_space_ends_the_command(void)
 /* TRM-006 */
 static void test_a_leading_number_is_never_a_command(void)
 {
-    assert_refused("85m200", "?9 not available");
-    assert_refused("1", "?9 not available");
+    assert_refused("10m200", "?9 not available");
     assert_refused("0m1", "?9 not available");
+    assert_refused("1", "?2 syntax");
+    assert_refused("256m1", "?12 range 0..255");
+    assert_refused("/m1", "?21 to whom?");
 }
 
 /* TRM-007 */
@@ -702,7 +704,7 @@ static void test_velocity_0_is_named(void)
 
 static void test_what_this_version_lacks_is_named(void)
 {
-    static const char *const lines[] = {"85m200", "0"};
+    static const char *const lines[] = {"10m200", "0m1"};
     for (size_t i = 0; i < sizeof lines / sizeof lines[0]; i++)
         assert_refused(lines[i], "?9 not available");
 }
