@@ -6,7 +6,7 @@
 #include "cli/commands.h"
 #include "cli/network.h"
 #include "cli/terminal.h"
-#include "cli/timebase_port.h"
+#include "base/timebase_port.h"
 #include "cli/trial.h"
 #include "drivers.h"
 #include "eeprom/store.h"

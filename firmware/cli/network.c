@@ -8,7 +8,7 @@
 #include "cli/terminal.h"
 #include "cli/terminal_port.h"
 #include "cli/text.h"
-#include "cli/timebase_port.h"
+#include "base/timebase_port.h"
 #include "cli/trial.h"
 #include "net/bus.h"
 #include "net/bus_port.h"

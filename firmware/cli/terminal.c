@@ -10,7 +10,7 @@
 #include "cli/range.h"
 #include "cli/terminal_port.h"
 #include "cli/text.h"
-#include "cli/timebase_port.h"
+#include "base/timebase_port.h"
 #include "cli/trial.h"
 #include "version.h"
 

@@ -13,8 +13,8 @@ void wake_sleep(void)
 {
     SMCR = _BV(SE); /* mode 0 is IDLE */
     for (;;) {
-        cli();
         const uint8_t before = TIMEBASE_OVERFLOWS_LOW;
+        cli();
         if (wake_flag != 0) {
             break;
         }

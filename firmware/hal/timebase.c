@@ -5,7 +5,7 @@
 #include <avr/io.h>
 #include "base/atomic.h"
 #include "base/inline.h"
-#include "cli/timebase_port.h"
+#include "base/timebase_port.h"
 
 volatile uint32_t timebase_overflows;
 

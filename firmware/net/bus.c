@@ -2,7 +2,7 @@
 #include "base/inline.h"
 #include "base/zeroed.h"
 #include "net/bus_port.h"
-#include "cli/timebase_port.h"
+#include "base/timebase_port.h"
 #include "settings.h"
 
 bus_counters_t bus_counters;

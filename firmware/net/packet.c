@@ -71,9 +71,7 @@ packet_event_t packet_take(packet_t *packet, uint8_t byte, uint8_t own, bool str
     if (!mine) {
         return PACKET_NONE;
     }
-    if (event == PACKET_WHOLE) {
-        packet->body[packet->length] = '\0';
-    }
+    packet->body[packet->length] = '\0';
     return event;
 }
 

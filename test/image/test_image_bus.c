@@ -54,6 +54,47 @@ static void assert_answer(const char *line, double cycles_a_bit, const char *ans
 
 #define AT_REST "p\r\nposition 0 STANDBY faults 0\r\nSAC>"
 
+/* At the USB port: the terminal goes to the software port. */
+static void move_the_terminal(void)
+{
+    image_off();
+    image_power_on();
+    image_prompt();
+    image_do("$CE1");
+    image_run(SECOND / 2); /* it is stored */
+    image_send("$R\r");
+    image_run(SECOND / 2);
+    image_take_text();
+    bit = 16e6 / 38400;
+    soft_peer_begin(board, 38400);
+    board_record(board, CLK, false);
+    board_record(board, DIR, false);
+}
+
+/* NET-002, NET-003 */
+static void test_e_exchanges_the_ports_and_a_command_there_confirms_it(void)
+{
+    move_the_terminal();
+    assert_answer("p\r", bit, AT_REST);
+    image_run(62 * SECOND);
+    TEST_ASSERT_EQUAL_STRING("", image_take_text());
+    assert_answer("p\r", bit, AT_REST);
+}
+
+static void test_the_terminal_comes_back_if_nobody_types_at_the_other_port(void)
+{
+    move_the_terminal();
+    image_run(58 * SECOND);
+    TEST_ASSERT_EQUAL_STRING("", image_take_text());
+    image_run(4 * SECOND);
+    if (strstr(image_take_text(), "?20 E M m n taken back") == NULL)
+        image_fail("expected the terminal at the USB port again");
+    soft_peer_clear();
+    type("p\r", bit);
+    image_run(100 * MS);
+    TEST_ASSERT_EQUAL_STRING("", soft_peer_text());
+}
+
 /* PIN-015, NET-006: 8N1 at any rate; the terminal never moves Tx En */
 static void test_a_typed_line_is_answered_at_each_rate(void)
 {
@@ -106,6 +147,8 @@ static void test_a_break_spoils_one_line_and_does_not_repeat(void)
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(test_e_exchanges_the_ports_and_a_command_there_confirms_it);
+    RUN_TEST(test_the_terminal_comes_back_if_nobody_types_at_the_other_port);
     RUN_TEST(test_a_typed_line_is_answered_at_each_rate);
     RUN_TEST(test_no_byte_is_wrong_while_the_motor_steps_at_33_khz);
     RUN_TEST(test_a_glitch_is_no_byte);

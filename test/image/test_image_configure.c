@@ -434,19 +434,16 @@ static void test_a_restart_confirms_as_any_command(void)
 static void test_the_networks_parameters_are_tried_alike(void)
 {
     image_do("$CM99");
-    image_do("$CE1");
     image_do("$Cn9600");
     image_do("$CL20");
     image_do("$R");
     assert_shown("M d_id\t\t99\t"); /* which confirms */
     image_run(WRITTEN);
     image_do("$CM100");
-    image_do("$CE0");
     image_do("$Cn300");
     image_do("$R");
     assert_taken_back(board_cycle(board), 59 * SECOND, 61 * SECOND);
     assert_shown("M d_id\t\t99\t");
-    assert_shown("E network\t1\t");
     assert_shown("n sw\t\t9600\r\n");
 }
 

@@ -306,6 +306,15 @@ static bool is_single(void)
     return true;
 }
 
+/* A line with the unit's own address is executed here. */
+static const char *behind_own_address(const char *line)
+{
+    char *behind;
+    if (line[0] < '0' || line[0] > '9')
+        return line;
+    return strtoul(line, &behind, 10) == settings.device_id ? behind : line;
+}
+
 static bool same_look(const look_t *a, const look_t *b)
 {
     return memcmp(&a->session, &b->session, sizeof a->session) == 0 &&
@@ -346,9 +355,10 @@ static void one_turn(void)
     if (single) {
         reading_t reading;
         const bool broken = editor.damaged || editor.too_long;
+        const char *const text = before.mode == MODE_COMMANDS ? behind_own_address(editor.text) : editor.text;
         read_t kind = broken ? READ_REFUSED
                       : before.mode != MODE_COMMANDS ? READ_OTHER
-                                                     : reference_read(editor.text, &before.session, &reading);
+                                                     : reference_read(text, &before.session, &reading);
         if ((kind == READ_MOTION || kind == READ_VALUE || kind == READ_OPEN) &&
             !is_possible(reading.command.velocity, reading.command.flags))
             kind = READ_REFUSED;
@@ -372,12 +382,12 @@ static void one_turn(void)
             least = stopped || (reading.command.flags & MOTION_SYNC) ? 0 : least;
             if (memcmp(&after.entries[before.next], &reading.command, sizeof reading.command) != 0)
                 fail("the entry is not what was typed");
-        } else if (kind == READ_OPEN || (before.mode == MODE_COMMANDS && strchr("xXlL", editor.text[0]) != NULL)) {
+        } else if (kind == READ_OPEN || (before.mode == MODE_COMMANDS && strchr("xXlL", text[0]) != NULL)) {
             most = errors ? 0 : UINT32_MAX;
         }
         /* The first + or - comes while the motor stands. */
         least += typed_pulses > 0;
-        most += typed_pulses;
+        most += typed_pulses + (text != editor.text && (text[0] == '+' || text[0] == '-'));
         if (made < least || made > most)
             fail("%zu pulses, expected %" PRIu64 " to %" PRIu64, made, least, most);
     }

@@ -186,7 +186,7 @@ static void test_cruise_keeps_the_cycle_not_the_rpm_and_does_not_drift(void)
 static const char *const busy_lines[] = {
     "q\r",      "cf\r",      "m99999999999\r", "hello\r",     "vd\r",       "v100\r", "+-+-\r",  "?\r",  "a5.55\r",
     "\r\n\r\n", "k\b\b\b\r", "\x1b\x1b",       "xyzzy 123\r", "d1\r",       "p\r",    "m20v0\r", "cc\r", "vc3000\r",
-    "m0x\r",    "gg\r",      "nonsense\r",     "85m200\r",    "m10a1d1k\r", "l\r"};
+    "m0x\r",    "gg\r",      "nonsense\r",     "10m200\r",    "m10a1d1k\r", "l\r"};
 
 /* Whatever is typed by that many random lines back to back, none of which stops the motor or moves it while it runs.
  * single_pulses: + and - among them. Read in the moment after the last pulse they would rightly move it. */

@@ -1,5 +1,5 @@
 #include "host/fakes/timebase_port_fake.h"
-#include "cli/timebase_port.h"
+#include "base/timebase_port.h"
 
 uint32_t timebase_fake_us;
 uint32_t timebase_fake_step_us;

@@ -1,9 +1,9 @@
-/* The clock of debug mode, boot and trial; implemented by hal/timebase.c with Timer0, running always.
+/* The clock of debug mode, boot, trial and network; implemented by hal/timebase.c with Timer0, running always.
  *
- * Units:   microseconds, modulo 2^32, resolution 4. Context: main loop. Errors: none.
+ * Units:   microseconds, modulo 2^32, resolution 0.5. Context: main loop. Errors: none.
  * Tests:   test/host/fakes/timebase_port_fake.c; test/image. */
-#ifndef CLI_TIMEBASE_PORT_H
-#define CLI_TIMEBASE_PORT_H
+#ifndef BASE_TIMEBASE_PORT_H
+#define BASE_TIMEBASE_PORT_H
 
 #include <stdint.h>
 
