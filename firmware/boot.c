@@ -1,7 +1,7 @@
 #include "boot.h"
+#include "base/timebase_port.h"
 #include "boot_port.h"
 #include "cli/terminal_port.h"
-#include "base/timebase_port.h"
 
 enum { POWER_ON = 1 << 0, BROWN_OUT = 1 << 2, WATCHDOG = 1 << 3 };
 

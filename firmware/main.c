@@ -1,12 +1,12 @@
 /* Boot, then the polled loop: nothing else. */
 #include "base/atomic.h"
+#include "base/timebase_port.h"
 #include "base/wake.h"
 #include "boot.h"
 #include "boot_port.h"
 #include "cli/commands.h"
 #include "cli/network.h"
 #include "cli/terminal.h"
-#include "base/timebase_port.h"
 #include "cli/trial.h"
 #include "drivers.h"
 #include "eeprom/store.h"

@@ -1,7 +1,8 @@
 /* The displays: tables and lists, printed piece by piece as the port takes them, so that nothing waits for the line.
  *
- * Nothing is displayed for a line from the network. A display that is asked for while another is printed waits for its turn; up to DISPLAY_WAITING can wait. What a
- * display shows of the session and the time is that of the moment it begins; the queue is read row by row.
+ * Nothing is displayed for a line from the network. A display that is asked for while another is printed waits for its
+ * turn; up to DISPLAY_WAITING can wait. What a display shows of the session and the time is that of the moment it begins;
+ * the queue is read row by row.
  * Every row ends with CR LF; the prompt is the terminal's business.
  * Context: main loop. Cost: one piece, at most 24 characters, each call.
  * Errors:  STATUS_BUSY: too many are waiting; this one is not taken.

@@ -1,6 +1,7 @@
 #include "cli/network.h"
 #include "base/flash.h"
 #include "base/inline.h"
+#include "base/timebase_port.h"
 #include "base/zeroed.h"
 #include "cli/commands.h"
 #include "cli/display.h"
@@ -8,7 +9,6 @@
 #include "cli/terminal.h"
 #include "cli/terminal_port.h"
 #include "cli/text.h"
-#include "base/timebase_port.h"
 #include "cli/trial.h"
 #include "net/bus.h"
 #include "net/bus_port.h"
@@ -34,7 +34,8 @@ static uint8_t last_origin;
 
 /* What has been asked. */
 static enum { FREE, GREETING, ASKING, FAILED } asked; /* GREETING: a sequence alone; FAILED: that had no answer */
-static uint8_t asked_node, sequence;
+static uint8_t asked_node, asked_sequence;
+static uint8_t sequence; /* of the last packet, a soft op's too */
 static uint16_t asked_128us;
 static uint8_t greeted; /* the node that the last sequence went to */
 
@@ -122,6 +123,7 @@ status_t network_send(uint8_t destination, const char *text)
     if (destination != PACKET_EVERYBODY) {
         asked = what;
         asked_node = destination;
+        asked_sequence = sequence;
         asked_128us = timebase_128us();
     }
     send(destination);
@@ -140,7 +142,7 @@ static void show(const uint8_t *text)
 /* An answer to what has been asked. */
 static void take_answer(const uint8_t *body, uint8_t its_sequence)
 {
-    if (bus_packet.origin != asked_node || (bus_strict() && its_sequence != sequence)) {
+    if (bus_packet.origin != asked_node || (bus_strict() && its_sequence != asked_sequence)) {
         return;
     }
     if (asked == ASKING) {
@@ -158,7 +160,7 @@ static void take_answer(const uint8_t *body, uint8_t its_sequence)
 static status_t execute(const uint8_t *body)
 {
     if (*body == ' ' || *body == '.') {
-        if (display_active()) {
+        if (display_active() || shown != 0) {
             return STATUS_BUSY;
         }
         if (bus_packet.destination != PACKET_EVERYBODY) {

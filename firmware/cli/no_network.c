@@ -1,5 +1,7 @@
 /* In place of cli/network.c and net/: an image without the network, as long as both do not fit the chip together (the
- * Makefile's NETWORK). A line for another node is refused, and nothing is sent or received as a packet. */
+ * Makefile's NETWORK). A line for another node is refused, and nothing is sent or received as a packet.
+ *
+ * Context: main loop. Errors: STATUS_NOT_YET. Tests: test/image/test_image_terminal.c */
 #include "cli/network.h"
 #include "net/bus.h"
 

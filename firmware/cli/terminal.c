@@ -1,6 +1,7 @@
 #include "cli/terminal.h"
 #include "base/flash.h"
 #include "base/inline.h"
+#include "base/timebase_port.h"
 #include "base/zeroed.h"
 #include "cli/commands.h"
 #include "cli/display.h"
@@ -10,7 +11,6 @@
 #include "cli/range.h"
 #include "cli/terminal_port.h"
 #include "cli/text.h"
-#include "base/timebase_port.h"
 #include "cli/trial.h"
 #include "version.h"
 

@@ -1,6 +1,6 @@
 #include "cli/trial.h"
-#include "cli/terminal_port.h"
 #include "base/timebase_port.h"
+#include "cli/terminal_port.h"
 #include "eeprom/store.h"
 
 #define MINUTE_262MS 229

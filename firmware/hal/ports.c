@@ -6,8 +6,8 @@
 #include <stddef.h>
 #include "base/atomic.h"
 #include "base/inline.h"
-#include "cli/terminal_port.h"
 #include "base/timebase_port.h"
+#include "cli/terminal_port.h"
 #include "hal/baud.h"
 #include "net/bus_port.h"
 #include "ports_port.h"

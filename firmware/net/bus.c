@@ -1,8 +1,8 @@
 #include "net/bus.h"
 #include "base/inline.h"
+#include "base/timebase_port.h"
 #include "base/zeroed.h"
 #include "net/bus_port.h"
-#include "base/timebase_port.h"
 #include "settings.h"
 
 bus_counters_t bus_counters;

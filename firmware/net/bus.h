@@ -5,7 +5,7 @@
  * while one's own packet goes out is its echo, and dropped.
  * Units:   128 us, characters of the port's rate.
  * Context: main loop. Errors: PACKET_WRONG and PACKET_BROKEN are counted here.
- * Tests:   test/host/test_network.c with test/host/fakes/bus_port_fake.c; test/image/test_image_network.c
+ * Tests:   test/host/test_network.c with test/host/fakes/bus_port_fake.c
  * Source:  manual lines 183, 191-205, 215-217; decisions 0.4, A-NET-13, A-NET-14. */
 #ifndef NET_BUS_H
 #define NET_BUS_H

@@ -4,7 +4,7 @@
  * Units:   bytes. Context: main loop.
  * Errors:  a byte with a framing error, or bytes lost before one, are read as a byte 0xFF and counted; a packet's CRC
  *          tells them from a genuine one.
- * Tests:   test/host/fakes/bus_port_fake.c stands in for it; test/image/test_image_bus.c
+ * Tests:   test/host/fakes/bus_port_fake.c stands in for it
  * Source:  manual lines 181, 215-217, 664-666. */
 #ifndef NET_BUS_PORT_H
 #define NET_BUS_PORT_H

@@ -648,6 +648,38 @@ static void test_strict_soft_ops_have_a_sequence(void)
     TEST_ASSERT_EQUAL_HEX8((uint8_t)(sent[3] + 1), sent[11]);
 }
 
+/* A broadcast of its own comes between a command and its answer, with a sequence of its own. */
+static void test_a_soft_op_before_the_answer_does_not_hide_it(void)
+{
+    begin(OWN, 2);
+    type("$O1\r");
+    type("10m200\r");
+    receive(OWN, 10, "\x81\x06");
+    assert_sent(10, "\x82m200");
+    engine_fake.played = ++ops_played;
+    run_ms(20);
+    terminal_port_fake_clear();
+    receive(OWN, 10, "\x82\x06");
+    assert_shown("\r\nK\r\nSAC>");
+}
+
+static void test_a_message_does_not_take_the_place_of_an_answer_still_to_be_printed(void)
+{
+    begin(OWN, 1);
+    type("10m200\r");
+    assert_sent(10, "m200");
+    terminal_port_fake_hold(1);
+    type("as long as it is"); /* the port has no room for what is owed */
+    terminal_port_fake_clear();
+    receive(OWN, 10, "\x06");
+    receive(OWN, 10, " hello");
+    assert_sent(10, "\x15");
+    terminal_port_fake_hold(0);
+    terminal_port_fake_drain(31);
+    run_ms(5);
+    assert_shown("\r\nK\r\nSAC>as long as it is");
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -686,5 +718,7 @@ int main(void)
     RUN_TEST(test_a_strict_packet_without_sequence_or_with_a_wrong_crc_is_not_answered);
     RUN_TEST(test_another_node_is_greeted);
     RUN_TEST(test_strict_soft_ops_have_a_sequence);
+    RUN_TEST(test_a_soft_op_before_the_answer_does_not_hide_it);
+    RUN_TEST(test_a_message_does_not_take_the_place_of_an_answer_still_to_be_printed);
     return UNITY_END();
 }
