@@ -4,6 +4,9 @@
 #include "eeprom/store.h"
 
 #define MINUTE_262MS 229
+/* So much longer what is being printed may take: with a new rate in the midst of it the receiver would lose the bytes'
+ * boundaries, and what it is told next. */
+#define PRINTING_262MS 8
 
 static enum { NONE, ASKED, ON } trial;
 static uint8_t since; /* it has been ON */
@@ -36,7 +39,8 @@ bool trial_failed(void)
             trial = ON;
         }
     }
-    if ((uint8_t)(now - since) < MINUTE_262MS) {
+    const uint8_t elapsed = (uint8_t)(now - since);
+    if (elapsed < MINUTE_262MS || (elapsed < MINUTE_262MS + PRINTING_262MS && !terminal_port_idle())) {
         return false;
     }
     trial = NONE;
