@@ -30,13 +30,9 @@ typedef struct {
     uint16_t divisor;
 } usart_t;
 
-static NOINLINE port_t *port_of(uint8_t hardware)
-{
-    return hardware ? &usart_port : &soft_uart.port;
-}
-
-#define TERMINAL port_of(!network)
-#define BUS port_of(network)
+/* At 250,000 Bd a character lasts 640 cycles, and all that is done for one counts: so what a port's functions have in
+ * common is compiled twice, with the addresses of each, and the role chosen once. */
+#define ALWAYS_INLINE static inline __attribute__((always_inline))
 
 /* -- rates and roles ----------------------------------------------------------------------------------------------- */
 
@@ -94,24 +90,44 @@ void ports_init(void)
 
 /* -- rings --------------------------------------------------------------------------------------------------------- */
 
-static NOINLINE int16_t get(port_t *port)
+ALWAYS_INLINE int16_t take(port_t *port, uint8_t places)
 {
     const uint8_t tail = port->rx_tail;
     if (tail == port->rx_head) {
         return -1;
     }
     const uint8_t byte = port->rx[tail];
-    uint8_t next = (uint8_t)(tail + 1);
-    if (next == (port == &usart_port ? USART_RX_BYTES : SOFT_RX_BYTES)) {
-        next = 0;
-    }
-    port->rx_tail = next;
+    port->rx_tail = tail == places - 1 ? 0 : (uint8_t)(tail + 1);
     return byte;
 }
 
-static uint8_t free_places(const port_t *port)
+static int16_t get(uint8_t hardware)
+{
+    return hardware ? take(&usart_port, USART_RX_BYTES) : take(&soft_uart.port, SOFT_RX_BYTES);
+}
+
+ALWAYS_INLINE uint8_t free_places_of(const port_t *port)
 {
     return (uint8_t)((port->tx_tail - port->tx_head - 1) & (PORT_TX_BYTES - 1));
+}
+
+static uint8_t free_places(uint8_t hardware)
+{
+    return hardware ? free_places_of(&usart_port) : free_places_of(&soft_uart.port);
+}
+
+ALWAYS_INLINE uint8_t waiting(const port_t *port, uint8_t places)
+{
+    const uint8_t head = port->rx_head;
+    const uint8_t tail = port->rx_tail;
+    return (uint8_t)(head >= tail ? head - tail : head + places - tail);
+}
+
+ALWAYS_INLINE void append(port_t *port, uint8_t byte)
+{
+    const uint8_t head = port->tx_head;
+    port->tx[head] = byte;
+    port->tx_head = (uint8_t)((head + 1) & (PORT_TX_BYTES - 1));
 }
 
 static bool soft_sends(void)
@@ -119,17 +135,16 @@ static bool soft_sends(void)
     return (TIMSK0 & _BV(OCIE0A)) != 0;
 }
 
-static NOINLINE void put(port_t *port, uint8_t byte)
+static void put(uint8_t hardware, uint8_t byte)
 {
-    if (port == &usart_port) {
+    if (hardware) {
         UCSR0A = (uint8_t)((UCSR0A & _BV(U2X0)) | _BV(TXC0)); /* cleared, until this one is out (20.11.2) */
-    }
-    const uint8_t head = port->tx_head;
-    port->tx[head] = byte;
-    port->tx_head = (uint8_t)((head + 1) & (PORT_TX_BYTES - 1));
-    if (port == &usart_port) {
+        append(&usart_port, byte);
         UCSR0B = usart_control | _BV(UDRIE0);
-    } else if (!soft_sends()) {
+        return;
+    }
+    append(&soft_uart.port, byte);
+    if (!soft_sends()) {
         /* The first match, at once, leaves the line high; the start bit comes a bit later. */
         soft_uart.tx_intervals = 1;
         soft_uart.tx_bits = SOFT_TX_LAST;
@@ -145,24 +160,22 @@ static NOINLINE void put(port_t *port, uint8_t byte)
 
 int16_t terminal_port_get(void)
 {
-    return get(TERMINAL);
+    return get(!network);
 }
 
 uint8_t terminal_port_waiting(void)
 {
-    const port_t *port = TERMINAL;
-    const int8_t waiting = (int8_t)(port->rx_head - port->rx_tail);
-    return (uint8_t)(waiting >= 0 ? waiting : waiting + (network ? SOFT_RX_BYTES : USART_RX_BYTES));
+    return network ? waiting(&soft_uart.port, SOFT_RX_BYTES) : waiting(&usart_port, USART_RX_BYTES);
 }
 
 uint8_t terminal_port_free(void)
 {
-    return free_places(TERMINAL);
+    return free_places(!network);
 }
 
 uint8_t terminal_port_peek(uint8_t others)
 {
-    return TERMINAL->rx[others];
+    return (network ? &soft_uart.port : &usart_port)->rx[others];
 }
 
 bool terminal_port_idle(void)
@@ -175,7 +188,7 @@ bool terminal_port_idle(void)
 
 void terminal_port_put(uint8_t byte)
 {
-    put(TERMINAL, byte);
+    put(!network, byte);
 }
 
 void ops_port_send(uint8_t byte)
@@ -189,7 +202,7 @@ void ops_port_send(uint8_t byte)
 
 int16_t bus_port_get(void)
 {
-    return get(BUS);
+    return get(network);
 }
 
 void bus_port_begin(void)
@@ -208,12 +221,12 @@ uint8_t bus_port_free(void)
     if (network && (uint16_t)(timebase_128us() - begun_128us) <= bus_port_characters_128us(1) / 8 + 1) {
         return 0;
     }
-    return free_places(BUS);
+    return free_places(network);
 }
 
 void bus_port_put(uint8_t byte)
 {
-    put(BUS, byte);
+    put(network, byte);
 }
 
 void bus_port_end(void)
@@ -244,19 +257,24 @@ uint16_t bus_port_characters_128us(uint8_t characters)
     return (uint16_t)((bit * 10 * characters >> 16) + 1);
 }
 
+static port_t *bus(void)
+{
+    return network ? &usart_port : &soft_uart.port;
+}
+
 uint8_t bus_port_framing_errors(void)
 {
-    return BUS->framing;
+    return bus()->framing;
 }
 
 uint8_t bus_port_overruns(void)
 {
-    return BUS->overruns;
+    return bus()->overruns;
 }
 
 void bus_port_clear(void)
 {
-    port_t *port = BUS;
+    port_t *port = bus();
     port->framing = 0;
     port->overruns = 0;
 }
