@@ -5,12 +5,11 @@
 BUILD ?= build
 # More macros for the firmware, e.g. DEFS='-DSETTINGS_USTEP=3'. A change rebuilds what it touches.
 DEFS ?=
-# 1: an image with the network. It does not fit the chip yet (docs/design.md, "What the next parts will find").
-NETWORK ?= 0
 # Budgets in bytes; what exceeds one fails the build. Flash: what the half-kilobyte bootloader of today's Nanos leaves. (The
-# design aims at 26 KB and 1,400 bytes: docs/design.md, "Targets and their price".) RAM is what is taken before the first call, the stack apart.
+# design aims at 26 KB and 1,400 bytes: docs/design.md, "Targets and their price".) RAM is what is taken before the first
+# call; that the stack fits beside it is proven (tools/check_stack.py).
 FLASH_BUDGET := 32256
-RAM_BUDGET := 1744
+RAM_BUDGET := 1752
 # V=1 shows the commands.
 V ?=
 # How many jobs build and test side by side.
@@ -34,8 +33,6 @@ UNITY ?= $(firstword $(wildcard .tools/unity /usr/share/cmock/vendor/unity/src) 
 # -- the firmware's sources ------------------------------------------------------------------------------------------
 
 # (In which order their functions are linked is decided by firmware/link_order.ld.)
-NETWORK_SRCS_0 := firmware/cli/no_network.c
-NETWORK_SRCS_1 := firmware/net/packet.c firmware/net/bus.c firmware/cli/network.c
 FIRMWARE_SRCS := \
     firmware/hal/step_isr.S \
     firmware/hal/step_snapshot.S \
@@ -68,7 +65,7 @@ FIRMWARE_SRCS := \
     firmware/hal/reset.c \
     firmware/hal/timebase.c \
     firmware/hal/ports.c \
-    $(NETWORK_SRCS_$(NETWORK)) \
+    firmware/net/packet.c firmware/net/bus.c firmware/cli/network.c \
     firmware/cli/line.c \
     firmware/cli/terminal.c \
     firmware/cli/trial.c \
@@ -169,10 +166,12 @@ AVR_WARNINGS := -Wall -Wextra -Wconversion -Wshadow -Wlogical-op -Wstrict-protot
 AVR_VERSION = $(shell $(AVR)gcc -dumpversion 2>/dev/null)
 AVR_SMALLER = -Os -mcall-prologues -mstrict-X -fno-gcse -fno-move-loop-invariants -fno-ipa-sra \
     -flto -fno-tree-forwprop -fno-tree-dominator-opts -fno-inline-small-functions -fira-algorithm=priority -fira-region=all \
-    -fno-tree-sink -fweb -frename-registers -fno-tree-copy-prop -fno-tree-coalesce-vars \
-    -fno-tree-scev-cprop -fno-tree-copyrename -flto-partition=none $(if $(filter 5.%,$(AVR_VERSION)),-fno-toplevel-reorder)
-# Arithmetic of 32 bits nearly throughout: smaller if the registers of a value stay together.
-WIDE_SRCS := firmware/motion/ramp.c firmware/motion/profile.c
+    -fno-tree-sink -fweb -fno-tree-copy-prop -fno-tree-coalesce-vars \
+    -fno-tree-scev-cprop -fno-tree-reassoc -fno-tree-pta -flto-partition=none $(if $(filter 5.%,$(AVR_VERSION)),-fno-toplevel-reorder)
+# What suits single files. Arithmetic of 32 bits nearly throughout: smaller if the registers of a value stay together.
+SMALLER_firmware/motion/ramp.c := -fno-split-wide-types
+SMALLER_firmware/motion/profile.c := -fno-split-wide-types
+SMALLER_firmware/motion/engine.c := -ftree-dominator-opts -ftree-sink -fno-tree-fre -fno-tree-loop-optimize
 AVR_CFLAGS = $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 $(AVR_SMALLER) -g -ffunction-sections -fdata-sections -fshort-enums \
     -fstack-usage -I$(BUILD)/packed -Ifirmware $(AVR_WARNINGS)
 AVR_LDFLAGS := $(AVR_MCU) -Wl,--gc-sections -mrelax -nostartfiles -T firmware/image.ld -Lfirmware
@@ -186,7 +185,7 @@ firmware: $(BUILD)/sac.hex budgets ## build/sac.elf and build/sac.hex; budgets o
 # Rewritten only when it changes; every object depends on it. Several makes may look at it at the same time.
 $(BUILD)/firmware/flags: FORCE
 	@mkdir -p $(@D)
-	@echo '$(AVR) $(AVR_CFLAGS) $(AVR_LDFLAGS) $(DEFS) $(FIRMWARE_SRCS) $(WIDE_SRCS)' >$@.$$$$ && \
+	@echo '$(AVR) $(AVR_CFLAGS) $(AVR_LDFLAGS) $(DEFS) $(FIRMWARE_SRCS) $(foreach s,$(FIRMWARE_SRCS),$(SMALLER_$s)) $(TIMED)' >$@.$$$$ && \
 	    if cmp -s $@.$$$$ $@; then rm $@.$$$$; else mv $@.$$$$ $@; fi
 
 # The tables with texts, packed: the compiler finds them before those in firmware/.
@@ -200,11 +199,21 @@ $(PACKED): tools/pack_texts.py firmware/cli/pairs.def firmware/cli/commands.def 
 $(BUILD)/firmware/%.o: firmware/% $(BUILD)/firmware/flags $(PACKED)
 	@mkdir -p $(@D)
 	$(call say,CC  $@)
-	$(Q)$(AVR)gcc $(AVR_CFLAGS) $(if $(filter $<,$(WIDE_SRCS)),-fno-split-wide-types) $(DEFS) -MMD -MP -c -o $@ $<
+	$(Q)$(AVR)gcc $(AVR_CFLAGS) $(SMALLER_$<) $(DEFS) -MMD -MP -c -o $@ $<
 
-$(BUILD)/sac.elf: $(FIRMWARE_OBJS) $(LINK_SCRIPTS) $(BUILD)/firmware/flags
+# Link time optimisation ends in one file for the assembler, which is tools/outline.py here.
+OUTLINE := $(BUILD)/outline/as
+# What the terminal at 250 kBd and the planner spend most of their time in.
+TIMED := terminal_poll,terminal_port_put,terminal_port_get,main,line_take,append_run,push,block_append,cruise_next,ramp_next,commands_execute,queue_poll,offer,engine_single_pulse,commands_read_ahead,find,command_pulse,ramp_steps,start_next,engine_poll,terminal_port_free,text_put,set_interval,pulses_left,look_for_end,note_begun,take,play_on,ops_poll,pulses_in_gear,pulses_of_phase,add_pulses,choose,append,take_next
+$(OUTLINE): tools/outline.py $(BUILD)/firmware/flags
+	@mkdir -p $(@D)
+	@echo '#!/bin/sh' >$@
+	@echo 'exec $(PYTHON) $< --order firmware/link_order.ld --timed "$(TIMED)" --as $(AVR)as -- "$$@"' >>$@
+	@chmod +x $@
+
+$(BUILD)/sac.elf: $(FIRMWARE_OBJS) $(LINK_SCRIPTS) $(BUILD)/firmware/flags $(OUTLINE)
 	$(call say,LD  $@)
-	$(Q)$(AVR)gcc $(AVR_CFLAGS) $(AVR_LDFLAGS) -Wl,-Map=$(BUILD)/sac.map -o $@ $(FIRMWARE_OBJS)
+	$(Q)$(AVR)gcc -B$(dir $(OUTLINE)) $(AVR_CFLAGS) $(AVR_LDFLAGS) -Wl,-Map=$(BUILD)/sac.map -o $@ $(FIRMWARE_OBJS)
 
 $(BUILD)/sac.hex: $(BUILD)/sac.elf
 	$(call say,HEX $@)
