@@ -97,7 +97,7 @@ static void make_ready(void)
     timer->top = s->top;
     timer->match = s->match;
     GPIOR0 = s->count_low;
-    GPIOR1 = s->count_high;
+    step_count_high = s->count_high;
     step_flags = s->flags;
     motion_state = s->flags & SEGMENT_STATE_MASK;
     step_tail = (uint8_t)(first + SEGMENT_BYTES);
@@ -184,7 +184,7 @@ static inline __attribute__((always_inline)) bool freeze_behind_period(volatile 
 static bool freeze_within_period(volatile timer1_t *timer, uint8_t tail)
 {
     const segment_t *s = segment_at((uint8_t)(tail - SEGMENT_BYTES));
-    if (GPIOR0 == s->count_low && GPIOR1 == s->count_high) /* its first period is still to come */
+    if (GPIOR0 == s->count_low && step_count_high == s->count_high) /* its first period is still to come */
         s = segment_at((uint8_t)(tail - 2 * SEGMENT_BYTES));
     uint16_t safe = s->match < FREEZE_TICKS ? 0 : (uint16_t)(s->match - FREEZE_TICKS);
     if (tail != step_tail)
@@ -331,10 +331,10 @@ uint16_t step_port_shorten(uint8_t offset, uint16_t periods)
     if (tail != after) {
         set_less_one(s, wanted); /* here already: the interrupt may be about to load it */
     } else {
-        left = less_one(GPIOR0, GPIOR1);
+        left = less_one(GPIOR0, step_count_high);
         if (left > wanted) {
             GPIOR0 = (uint8_t)periods;
-            GPIOR1 = (uint8_t)(wanted >> 8);
+            step_count_high = (uint8_t)(wanted >> 8);
         } else {
             left = wanted;
         }
