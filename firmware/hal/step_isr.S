@@ -1,14 +1,15 @@
 /* The step interrupt: counts periods, and at the end of a segment loads the next one into Timer1's buffers.
  *
- * Cycles, interrupt entry (4) and the jump in the vector table (3) included:
- *   period counted                      23
- *   period counted, low byte wrapped    30
- *   segment loaded                      90, with a change of dir or gear 123
+ * Cycles, interrupt entry (4) and the jump in the vector table (2) included:
+ *   period counted                      22
+ *   period counted, low byte wrapped    31
+ *   segment loaded                      89, with a change of dir or gear 123
  *   segment loaded one to three periods early, waits included: at most 160
- *   ring empty                          86
+ *   ring empty                          85
  * (measured: make bench BENCH=isr)
  *
- * It is the only interrupt that is never interrupted: SREG rests in GPIOR2, the counter in GPIOR0 (low) and GPIOR1.
+ * It is the only interrupt that is never interrupted: r24 rests in GPIOR1, SREG in GPIOR2. The counter is in GPIOR0, and
+ * in step_count_high.
  * Where it takes longer than Estop can wait it looks for Estop itself, and takes the clock from the timer.
  * The registers written here are double-buffered: they take effect when the running period ends (datasheet section
  * 16.9.3), so an interrupt that comes late by less than a period moves no edge. */
@@ -27,7 +28,7 @@ segments:
         .skip 256
 
         .section .bss
-        .global step_clock, step_head, step_tail, step_flags, step_hold, step_held, step_idle, step_late, motion_state
+        .global step_clock, step_head, step_tail, step_flags, step_hold, step_held, step_idle, step_late, step_count_high, motion_state
 step_clock:   .skip 1
 step_head:    .skip 1
 step_tail:    .skip 1
@@ -36,6 +37,7 @@ step_hold:    .skip 1
 step_held:    .skip 1
 step_idle:    .skip 1
 step_late:    .skip 1
+step_count_high: .skip 1
 motion_state: .skip 1
 
 /* The segment at Z into the timer's buffers: high bytes first (TEMP, datasheet section 16.3). */
@@ -61,7 +63,7 @@ motion_state: .skip 1
         ldd     r24, Z + 4
         out     io(GPIOR0), r24
         ldd     r24, Z + 5
-        out     io(GPIOR1), r24
+        sts     step_count_high, r24
         mov     r24, r30
         subi    r24, -SEGMENT_BYTES
         sts     step_tail, r24
@@ -79,7 +81,7 @@ motion_state: .skip 1
         .global TIMER1_OVF_vect
         .type TIMER1_OVF_vect, @function
 TIMER1_OVF_vect:
-        push    r24
+        out     io(GPIOR1), r24
         in      r24, io(SREG)
         out     io(GPIOR2), r24
         in      r24, io(GPIOR0)
@@ -87,16 +89,17 @@ TIMER1_OVF_vect:
         out     io(GPIOR0), r24
         breq    low_byte_over
 return:
+        look_for_estop                  /* a section with interrupts off may begin right behind this interrupt */
         in      r24, io(GPIOR2)
         out     io(SREG), r24
-        pop     r24
+        in      r24, io(GPIOR1)
         reti
 
 low_byte_over:
-        in      r24, io(GPIOR1)
+        lds     r24, step_count_high
         subi    r24, 1
         brcs    segment_over
-        out     io(GPIOR1), r24         /* 256 more: GPIOR0 is 0 already */
+        sts     step_count_high, r24    /* 256 more: GPIOR0 is 0 already */
         rjmp    return
 
 empty:
@@ -125,7 +128,7 @@ leave:
         pop     r30
         in      r24, io(GPIOR2)
         out     io(SREG), r24
-        pop     r24
+        in      r24, io(GPIOR1)
         reti
 
         /* Too short a period to reload in: the count ended early, and the periods still due are waited for here. The
@@ -231,7 +234,7 @@ stop_early_again:
 uncount:                                /* r24: periods due, r30: what was to be loaded */
         out     io(GPIOR0), r24
         ldi     r31, 0
-        out     io(GPIOR1), r31
+        sts     step_count_high, r31
         ldi     r31, hi8(segments)
         sts     step_tail, r30
         subi    r30, SEGMENT_BYTES
@@ -252,7 +255,7 @@ early_empty:                            /* r24: the early bits; one period has b
         lds     r31, step_held
         subi    r31, -HOLD_PERIODS
         sts     step_held, r31
-        ldi     r31, HOLD_PERIODS - 1   /* as early as before (GPIOR1 is 0) */
+        ldi     r31, HOLD_PERIODS - 1   /* as early as before (step_count_high is 0) */
         out     io(GPIOR0), r31
         rjmp    leave
 1:      ldi     r31, 0                  /* no segment: silence, when what is due has been played */
@@ -274,7 +277,7 @@ ring_empty:
         mov     r31, r24
         tst     r24
         breq    run_out
-2:      out     io(GPIOR0), r31         /* (GPIOR1 is 0) */
+2:      out     io(GPIOR0), r31         /* (step_count_high is 0) */
         sub     r24, r31
         sts     step_hold, r24
         lds     r24, step_held
@@ -304,7 +307,6 @@ INT0_vect:
         push    r24
         ldi     r24, MODE15_STOPPED
         sts     TCCR1B, r24
-        sts     wake_flag, r24          /* not 0 */
         ldi     r24, 0
         out     io(EIMSK), r24          /* a held command is not released any more either */
         lds     r24, TIMSK1
@@ -317,9 +319,9 @@ INT0_vect:
         cli
 1:      ldi     r24, 0
         sts     TIMSK1, r24
+        ldi     r24, hi8(SEGMENT_SILENT)
         sbis    io(PINB), 2
         rjmp    2f
-        ldi     r24, hi8(SEGMENT_SILENT)
         sts     OCR1AH, r24             /* and long: what is over when the main loop comes is this period */
         sts     OCR1AL, r24
         sts     OCR1BH, r24
@@ -332,7 +334,8 @@ INT0_vect:
         nop
         sbis    io(PINB), 2             /* it was in its last tick, and is counted already */
         sts     TCCR1B, r24
-2:      pop     r24
+2:      sts     wake_flag, r24          /* not 0 */
+        pop     r24
         reti
         .size INT0_vect, . - INT0_vect
 

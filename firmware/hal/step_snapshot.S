@@ -1,5 +1,5 @@
 /* step_port_snapshot() of motion/step_port.h: a struct of five bytes is returned in r18 to r22, which the compiler makes
- * by way of a frame. step_timer.c asserts where its members are. 8 cycles with interrupts masked. */
+ * by way of a frame. step_timer.c asserts where its members are. 9 cycles with interrupts masked. */
 #include <avr/io.h>
 
 #define io(reg) _SFR_IO_ADDR(reg)
@@ -11,7 +11,7 @@ step_port_snapshot:
         in      r25, io(SREG)
         cli
         in      r19, io(GPIOR0)
-        in      r20, io(GPIOR1)
+        lds     r20, step_count_high
         in      r22, io(TIFR1)
         in      r21, io(PINB)
         lds     r18, step_tail

@@ -16,12 +16,18 @@
 #define RUNNING (MODE15_B | 1 << CS10)
 #define LEAD_BEGIN 4 /* not at BOTTOM, where the buffers would be loaded */
 
-/* Ticks between reading TCNT1 and the timer standing still, and a margin. */
+/* Ticks between reading TCNT1 and the timer standing still, and a margin; of an external clock, of 2.5 cycles at least. */
 #define FREEZE_TICKS 16
+#define FREEZE_EXTERNAL_TICKS 6
 
 /* So near its end a period is waited for: 6 cycles a poll are longer than that, and than one that is reloaded early. */
 #define NEAR_END_TICKS 40
 #define END_POLLS 15
+
+/* An external clock is looked at up to 256 times, but for these only where no pulse is near. Not if so few ticks of a period
+ * are not near its pulse: then a tick is 4 cycles or more, and two of them are the most that can be missed. */
+#define HURRIED_ROUNDS 64
+#define SAFE_TICKS 16
 
 /* Ticks between reading TCNT1 and the last of the buffers written, and a margin. */
 #define ARM_TICKS 64
@@ -97,7 +103,7 @@ static void make_ready(void)
     timer->top = s->top;
     timer->match = s->match;
     GPIOR0 = s->count_low;
-    GPIOR1 = s->count_high;
+    step_count_high = s->count_high;
     step_flags = s->flags;
     motion_state = s->flags & SEGMENT_STATE_MASK;
     step_tail = (uint8_t)(first + SEGMENT_BYTES);
@@ -180,40 +186,25 @@ static inline __attribute__((always_inline)) bool freeze_behind_period(volatile 
     return false;
 }
 
-/* The same where it does not end soon: at once, if no pulse is near. */
-static bool freeze_within_period(volatile timer1_t *timer, uint8_t tail)
+/* With an external clock, near a pulse or in it: the clock is taken where clk is low, and comes back if a pulse begins just
+ * then. What it is away are 5 cycles, and the pulse is longer by the edges missed meanwhile. A pulse that has begun is
+ * completed with that clock, which may stand still: in the last of the rounds with the internal one, and silence follows. */
+static bool freeze_external(volatile timer1_t *timer, uint16_t safe, uint8_t clock, uint8_t rounds)
 {
-    const segment_t *s = segment_at((uint8_t)(tail - SEGMENT_BYTES));
-    if (GPIOR0 == s->count_low && GPIOR1 == s->count_high) /* its first period is still to come */
-        s = segment_at((uint8_t)(tail - 2 * SEGMENT_BYTES));
-    uint16_t safe = s->match < FREEZE_TICKS ? 0 : (uint16_t)(s->match - FREEZE_TICKS);
-    if (tail != step_tail)
-        return false;
-    uint16_t now = timer->counter;
-    if (TIFR1 & 1 << TOV1)
-        return false;
-    if (now < safe) {
-        timer->control_b = MODE15_B;
-        return true;
+    if (rounds) {
+        if ((rounds > HURRIED_ROUNDS && safe >= SAFE_TICKS) || PINB & 1 << 2)
+            return false;
+    } else {
+        clock = MODE15_B;
     }
-    return (uint16_t)(s->top - now) < NEAR_END_TICKS && freeze_behind_period(timer);
-}
-
-/* The same with an external clock, which may stand still: a pulse that has begun is completed with it, in reasonable time,
- * or else with the internal one, and silence follows. While the clock is away edges are missed: a pulse that begins just now
- * is longer by one. */
-static bool freeze_external(volatile timer1_t *timer, bool patient)
-{
-    if (patient && PINB & 1 << 2)
-        return false;
     timer->control_b = MODE15_B;
     __asm__ __volatile__("nop\n\tnop"); /* until the pin can be read */
+    if (PINB & 1 << 2)
+        timer->control_b = clock;
     if (!(PINB & 1 << 2))
         return true;
-    if (patient) {
-        timer->control_b = step_clock;
+    if (rounds)
         return false;
-    }
     timer->top = SEGMENT_SILENT; /* and long: what is over then is this period */
     timer->match = SEGMENT_SILENT;
     timer->control_b = RUNNING;
@@ -223,25 +214,57 @@ static bool freeze_external(volatile timer1_t *timer, bool patient)
     return true;
 }
 
+/* Takes the clock away at once, if no pulse is near. Turns interrupts off; what can be worked out before is, and must still
+ * hold. `behind`: the period ends soon. */
+static inline __attribute__((always_inline)) bool freeze_within_period(volatile timer1_t *timer, uint8_t tail, uint8_t clock,
+                                                                       uint8_t rounds, bool *behind)
+{
+    const segment_t *s = segment_at((uint8_t)(tail - SEGMENT_BYTES));
+    uint8_t count_low = GPIOR0;
+    bool first = count_low == s->count_low && step_count_high == s->count_high; /* its first period is still to come */
+    if (first)
+        s = segment_at((uint8_t)(tail - 2 * SEGMENT_BYTES));
+    uint8_t reach = clock == RUNNING ? FREEZE_TICKS : FREEZE_EXTERNAL_TICKS;
+    uint16_t safe = s->match < reach ? 0 : (uint16_t)(s->match - reach);
+    uint16_t near_end = (uint16_t)(s->top - NEAR_END_TICKS);
+    cli();
+    if (tail != step_tail || (first && count_low != GPIOR0) || EIFR & 1 << INTF0)
+        return false;
+    uint16_t now = timer->counter;
+    if (TIFR1 & 1 << TOV1)
+        return false;
+    if (now < safe && !(PINB & 1 << 2)) { /* external clock: after the interrupt it may be the period before, in its pulse */
+        timer->control_b = MODE15_B;
+        return true;
+    }
+    if (clock != RUNNING)
+        return freeze_external(timer, safe, clock, rounds);
+    *behind = now > near_end;
+    return false;
+}
+
 void step_port_halt(void)
 {
     volatile timer1_t *const timer = timer1();
     uint8_t rounds = 0;
+    EIMSK &= (uint8_t)~(1 << INT1); /* from here on what is held stays so */
+    if (timer->control_b == MODE15_B)
+        TIMSK1 = 0;
     /* Until nobody counts: stopped, or playing uncounted silence. That may happen in here as well. */
     while (TIMSK1 & 1 << TOIE1) {
         uint8_t tail = step_tail;
-        bool fast = timer->control_b == RUNNING &&
-                    segment_at((uint8_t)(tail - SEGMENT_BYTES))->top < SEGMENT_EARLY1_BELOW_TICKS;
-        bool frozen = true;
-        cli();
-        if (fast) /* there is time for nothing but this */
+        uint8_t clock = timer->control_b;
+        bool frozen = false;
+        bool behind = false;
+        rounds--;
+        if (clock == RUNNING && segment_at((uint8_t)(tail - SEGMENT_BYTES))->top < SEGMENT_EARLY1_BELOW_TICKS) {
+            cli(); /* there is time for nothing but this */
+            behind = true;
+        } else {
+            frozen = freeze_within_period(timer, tail, clock, rounds, &behind);
+        }
+        if (behind)
             frozen = freeze_behind_period(timer);
-        else if (timer->control_b == MODE15_B) /* it is held */
-            EIMSK &= (uint8_t)~(1 << INT1);
-        else if (step_clock != RUNNING)
-            frozen = freeze_external(timer, --rounds != 0);
-        else
-            frozen = freeze_within_period(timer, tail);
         if (frozen)
             TIMSK1 = 0;
         sei();
@@ -331,10 +354,10 @@ uint16_t step_port_shorten(uint8_t offset, uint16_t periods)
     if (tail != after) {
         set_less_one(s, wanted); /* here already: the interrupt may be about to load it */
     } else {
-        left = less_one(GPIOR0, GPIOR1);
+        left = less_one(GPIOR0, step_count_high);
         if (left > wanted) {
             GPIOR0 = (uint8_t)periods;
-            GPIOR1 = (uint8_t)(wanted >> 8);
+            step_count_high = (uint8_t)(wanted >> 8);
         } else {
             left = wanted;
         }

@@ -375,8 +375,12 @@ static void absorb_held(void)
 /* So many pulses may be repeated from now on if the ring runs empty. */
 static NOINLINE void allow_hold(uint8_t pulses)
 {
+    uint8_t left = 0;
     uint8_t lock = atomic_begin();
-    step_hold = pulses > step_held ? (uint8_t)(pulses - step_held) : 0; /* those held meanwhile will be given back */
+    uint8_t held = step_held; /* those held meanwhile will be given back */
+    if (pulses > held)
+        left = (uint8_t)(pulses - held);
+    step_hold = left;
     atomic_end(lock);
 }
 

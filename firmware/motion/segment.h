@@ -63,6 +63,7 @@ extern volatile uint8_t step_hold;  /* main loop: how many pulses may be repeate
 extern volatile uint8_t step_held;  /* interrupt: how many were; main loop clears it in an atomic section */
 extern volatile uint8_t step_idle;  /* interrupt: 1 = the ring ran out and the timer plays silence uncounted */
 extern volatile uint8_t step_late;  /* interrupt: 1 = a reload missed its period (latched) */
+extern volatile uint8_t step_count_high; /* written by the interrupt: periods left, 256 each; GPIOR0 has the rest */
 extern volatile uint8_t motion_state; /* motion_state_t; interrupt while it plays, main loop in standstill */
 
 static inline segment_t *segment_at(uint8_t offset)

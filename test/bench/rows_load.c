@@ -194,7 +194,6 @@ static const char *const path_names[PATHS] = {"period counted",
                                               "segment loaded two periods early, the wait included",
                                               "ring empty"};
 
-#define GPIOR1_REGISTER 0x4A
 #define LONGEST 400
 
 typedef struct {
@@ -204,6 +203,7 @@ typedef struct {
     uint16_t tail_address;
     uint16_t flags_address;
     uint16_t late_address;
+    uint16_t high_address;
     uint8_t tail;
     uint8_t flags;
     uint8_t high;
@@ -214,7 +214,7 @@ static void remember(board_t *board, paths_t *paths)
 {
     paths->tail = board_peek8(board, paths->tail_address);
     paths->flags = board_peek8(board, paths->flags_address);
-    paths->high = board_peek8(board, GPIOR1_REGISTER);
+    paths->high = board_peek8(board, paths->high_address);
 }
 
 /* Asked after every instruction. What is remembered is from the end of the interrupt before. */
@@ -243,7 +243,7 @@ static bool look_at_isr(board_t *board, void *ctx)
             path = earlier ? PATH_EARLIER : early ? PATH_EARLY : dir ? PATH_LOADED_DIR : PATH_LOADED;
     } else if (board_peek8(board, paths->flags_address) != paths->flags || cycles > 40) {
         path = PATH_EMPTY;
-    } else if (board_peek8(board, GPIOR1_REGISTER) != paths->high) {
+    } else if (board_peek8(board, paths->high_address) != paths->high) {
         path = PATH_WRAPPED;
     }
     paths->histogram[path][cycles < LONGEST ? cycles : LONGEST]++;
@@ -274,6 +274,7 @@ void row_isr_paths(result_t *result)
         paths->measures = run_measures(&run);
         paths->tail_address = code_symbol(&run, "step_tail");
         paths->late_address = code_symbol(&run, "step_late");
+        paths->high_address = code_symbol(&run, "step_count_high");
         paths->flags_address = code_symbol(&run, "step_flags");
         paths->count = paths->measures->isr[STEP_VECTOR].count;
         paths->cycles = paths->measures->isr[STEP_VECTOR].cycles;

@@ -32,7 +32,7 @@ static struct {
     uint16_t next_top, next_match;
     bool late_write; /* written after this period's end */
     uint16_t late_top, late_match;
-    uint32_t to_count; /* GPIOR1:GPIOR0 */
+    uint32_t to_count; /* step_count_high:GPIOR0 */
     uint8_t waiting;   /* periods still to be waited for before a reload */
     uint64_t waits_from;
     bool dir;
