@@ -203,8 +203,11 @@ $(BUILD)/firmware/%.o: firmware/% $(BUILD)/firmware/flags $(PACKED)
 
 # Link time optimisation ends in one file for the assembler, which is tools/outline.py here.
 OUTLINE := $(BUILD)/outline/as
-# What the terminal at 250 kBd and the planner spend most of their time in.
-TIMED := terminal_poll,terminal_port_put,terminal_port_get,main,line_take,append_run,push,block_append,cruise_next,ramp_next,commands_execute,queue_poll,offer,engine_single_pulse,commands_read_ahead,find,command_pulse,ramp_steps,start_next,engine_poll,terminal_port_free,text_put,set_interval,pulses_left,look_for_end,note_begun,take,play_on,ops_poll,pulses_in_gear,pulses_of_phase,add_pulses,choose,append,take_next
+# Where the terminal at 250 kBd and the planner spend most of their time (docs/design.md, "How it fits").
+TIMED := main terminal_poll terminal_port_get terminal_port_put line_take commands_read_ahead commands_execute \
+    queue_poll take take_next choose offer start_next ramp_steps engine_poll engine_single_pulse play_on look_for_end \
+    note_begun pulses_left pulses_in_gear pulses_of_phase add_pulses ops_poll \
+    ramp_next set_interval cruise_next append append_run block_append push
 $(OUTLINE): tools/outline.py $(BUILD)/firmware/flags
 	@mkdir -p $(@D)
 	@echo '#!/bin/sh' >$@

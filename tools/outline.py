@@ -299,14 +299,14 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--as", dest="assembler", required=True, help="the assembler itself")
     parser.add_argument("--order", required=True, help="the linker's order of the functions")
-    parser.add_argument("--timed", default="", help="functions whose time counts, separated by commas")
+    parser.add_argument("--timed", default="", help="functions whose time counts")
     parser.add_argument("arguments", nargs=argparse.REMAINDER, help="of the assembler; the file is the last one")
     options = parser.parse_args()
     arguments = options.arguments[1:]
     path = pathlib.Path(arguments[-1])
     text = path.read_text(encoding="utf-8")
     if "\n__tmp_reg__ = " in text and "\t.section\t.gnu.lto_" not in text:  # the compiler's, and machine code at last
-        program = Program(text.split("\n"), set(options.timed.split(",")), order_of(options.order))
+        program = Program(text.split("\n"), set(options.timed.split()), order_of(options.order))
         program.shrink()
         path = path.with_name(path.name + ".outlined.s")
         path.write_text(program.text(), encoding="utf-8")

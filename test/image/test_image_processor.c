@@ -493,8 +493,8 @@ static void finish(void)
         shown = strlen(board_uart_text(board));
         image_run(5 * MS);
     }
-    static const char *const unknown[] = {"?1 ", "?2 ", "?9 "};
-    for (size_t i = 0; i < 3; i++)
+    static const char *const unknown[] = {"?1 ", "?2 "};
+    for (size_t i = 0; i < 2; i++)
         if (strstr(board_uart_text(board), unknown[i]))
             part("the unit does not know one of the lines: it has answered %s", unknown[i]);
     if (!processor_rests(model, board_cycle(board)))
