@@ -397,6 +397,11 @@ test-packet-long: ## all errors of 1, 2 and 3 bits in 200 packets of the network
 	@$(MAKE) -s --no-print-directory $(BUILD)/packets
 	@SAC_PACKETS=$${SAC_PACKETS:-200} $(BUILD)/packets
 
+.PHONY: fuzz-packet-long
+fuzz-packet-long: ## 10^9 frames and fragments into the network's decoder, sanitized (6 minutes); SAC_FRAMES=n makes fewer
+	@$(MAKE) -s --no-print-directory $(BUILD)/host/test_packet
+	@SAC_FRAMES=$${SAC_FRAMES:-1000000000} $(BUILD)/host/test_packet
+
 .PHONY: fuzz-image-long
 fuzz-image-long: ## 10^5 damaged lines at the image on the board; SAC_FUZZ_SEED=n makes others, SAC_FUZZ_LINES=n fewer
 	@$(MAKE) -s --no-print-directory $(BUILD)/image/test_image_fuzz $(BUILD)/sac.hex
