@@ -138,8 +138,9 @@ AVR_TESTS := test_number test_line test_session test_wide test_block test_ramp t
 # Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
 IMAGE_TESTS := test_image_boot test_image_pins test_image_encoder test_image_motion test_image_queue \
     test_image_sequence test_image_terminal test_image_stop test_image_configure test_image_powercut test_image_system test_image_timing test_image_clock test_image_stress \
-    test_image_estop test_image_ops test_image_processor test_image_fuzz test_image_automicro test_image_manual test_image_bus
+    test_image_estop test_image_ops test_image_processor test_image_fuzz test_image_automicro test_image_manual test_image_bus test_image_nodes
 test_image_bus_SRCS := test/image/soft_peer.c
+test_image_nodes_SRCS := test/image/nodes.c
 test_image_processor_SRCS := test/image/processor_model.c
 # What every whole-image test is linked with.
 IMAGE_COMMON_SRCS := test/image/image.c test/image/model.c
@@ -429,6 +430,11 @@ test-bus-long: ## 10^6 commands to 200 nodes on a line that loses 1 packet of 1,
 fuzz-image-long: ## 10^5 damaged lines at the image on the board; SAC_FUZZ_SEED=n makes others, SAC_FUZZ_LINES=n fewer
 	@$(MAKE) -s --no-print-directory $(BUILD)/image/test_image_fuzz $(BUILD)/sac.hex
 	@SAC_FUZZ_LINES=$${SAC_FUZZ_LINES:-100000} $(BUILD)/image/test_image_fuzz
+
+.PHONY: test-nodes-long
+test-nodes-long: ## 10^4 commands to three images on a line that loses packets (a minute); SAC_NODE_COMMANDS=n, SAC_NODE_LOSS=n
+	@$(MAKE) -s --no-print-directory $(BUILD)/image/test_image_nodes $(BUILD)/sac.hex
+	@SAC_NODE_COMMANDS=$${SAC_NODE_COMMANDS:-10000} $(BUILD)/image/test_image_nodes
 
 .PHONY: test-processor
 test-processor: ## 2,000 random scripts on the image and on the model of the command processor
