@@ -197,6 +197,8 @@ uint8_t master_sends(uint8_t destination, uint8_t sequence, const char *text)
     } while (count != before);
     const bool right = count >= 8 && bytes[0] == STX && bytes[1] == MASTER && bytes[2] == destination && bytes[3] == sequence &&
                        bytes[count - 3] == ETX && bytes[count - 2] == sum(bytes + 1, count - 4) && bytes[count - 1] == '\0';
+    if (!right)
+        nodes_run(ANSWER); /* whatever was on the line is over */
     return right ? bytes[4] : 0;
 }
 
