@@ -84,7 +84,7 @@ FIRMWARE_SRCS := \
 # needed on the host alone, and assembler on the AVR alone.
 
 HOST_TESTS := test_number test_status test_baud test_line test_settings test_store test_session test_queue \
-    test_encoder test_ops test_motion_syntax test_commands test_configure test_display test_trial test_terminal test_packet test_network test_fuzz test_boot test_drivers \
+    test_encoder test_ops test_motion_syntax test_commands test_configure test_display test_trial test_terminal test_packet test_network test_bus_nodes test_fuzz test_boot test_drivers \
     test_wide test_block test_ramp test_profile test_engine test_property_planner test_processor_model
 FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 STORE_SRCS := firmware/eeprom/store.c firmware/base/crc16.c firmware/settings.c test/host/fakes/eeprom_port_fake.c
@@ -112,6 +112,7 @@ test_trial_SRCS := firmware/cli/trial.c $(STORE_SRCS) test/host/fakes/terminal_p
 test_terminal_SRCS := $(CLI_SRCS)
 test_packet_SRCS := firmware/net/packet.c
 test_network_SRCS := $(CLI_SRCS)
+BUS_NODE_SRCS := test/host/bus_node.c $(CLI_SRCS)
 test_fuzz_SRCS := $(test_terminal_SRCS)
 test_fuzz_HOST_SRCS := test/fuzz/grammar.c test/fuzz/reference.c
 test_boot_SRCS := firmware/boot.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
@@ -134,8 +135,9 @@ AVR_TESTS := test_number test_line test_session test_wide test_block test_ramp t
 # Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
 IMAGE_TESTS := test_image_boot test_image_pins test_image_encoder test_image_motion test_image_queue \
     test_image_sequence test_image_terminal test_image_stop test_image_configure test_image_powercut test_image_system test_image_timing test_image_clock test_image_stress \
-    test_image_estop test_image_ops test_image_processor test_image_fuzz test_image_automicro test_image_manual test_image_bus
+    test_image_estop test_image_ops test_image_processor test_image_fuzz test_image_automicro test_image_manual test_image_bus test_image_nodes
 test_image_bus_SRCS := test/image/soft_peer.c
+test_image_nodes_SRCS := test/image/nodes.c
 test_image_processor_SRCS := test/image/processor_model.c
 # What every whole-image test is linked with.
 IMAGE_COMMON_SRCS := test/image/image.c test/image/model.c
@@ -316,6 +318,14 @@ $(HOST_BINS): $(BUILD)/host/%: test/host/%.c $$($$*_SRCS) $$($$*_HOST_SRCS) $(BU
 	$(call say,CC  $@)
 	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O1 $(UNITY_FLAGS) $(SANITIZE) $(TEST_INCLUDES) -o $@ $(filter %.c %.o,$^) -lm
 
+# The nodes of test_bus_nodes.
+BUS_NODE_FLAGS := -fPIC -shared -fvisibility=hidden
+$(BUILD)/host/test_bus_nodes: HOST_CFLAGS += -DBUS_NODE_SO='"$(BUILD)/host/bus_node.so"'
+$(BUILD)/host/bus_node.so: $(BUS_NODE_SRCS) $(HOST_HEADERS) Makefile
+	@mkdir -p $(@D)
+	$(call say,CC  $@)
+	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O1 $(SANITIZE) $(BUS_NODE_FLAGS) $(TEST_INCLUDES) -o $@ $(filter %.c,$^)
+
 # Unity reports over the serial port; the runner passes on what it says. -UAVR: Unity 2.5 would put its words into flash
 # and read them from RAM.
 $(AVR_IMAGES): $(BUILD)/avr/%.elf: test/host/%.c $$($$*_SRCS) test/avr/report.c $(HOST_HEADERS) Makefile
@@ -348,7 +358,7 @@ $(IMAGE_BINS): $(BUILD)/image/%: test/image/%.c $(IMAGE_COMMON_SRCS) $$($$*_SRCS
 	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O2 $(UNITY_FLAGS) $(TEST_INCLUDES) $(TEST_PATHS) -Itest/board $(BOARD_LDFLAGS) -o $@ \
 	    $(filter %.c %.o %.a,$^) $(BOARD_LIBS) -lm
 
-HOST_PARTS := $(HOST_BINS)
+HOST_PARTS := $(HOST_BINS) $(BUILD)/host/bus_node.so
 BOARD_PARTS := $(BOARD_BINS) $(BOARD_IMAGES)
 IMAGE_PARTS := $(IMAGE_BINS) $(BUILD)/sac.hex
 SIM_PARTS := $(BUILD)/sacsim $(BUILD)/sac.elf
@@ -409,10 +419,34 @@ test-packet-long: ## all errors of 1, 2 and 3 bits in 200 packets of the network
 	@$(MAKE) -s --no-print-directory $(BUILD)/packets
 	@SAC_PACKETS=$${SAC_PACKETS:-200} $(BUILD)/packets
 
+.PHONY: fuzz-packet-long
+fuzz-packet-long: ## 10^9 frames and fragments into the network's decoder, sanitized (6 minutes); SAC_FRAMES=n makes fewer
+	@$(MAKE) -s --no-print-directory $(BUILD)/host/test_packet
+	@SAC_FRAMES=$${SAC_FRAMES:-1000000000} $(BUILD)/host/test_packet
+
+# As in make test, without the sanitizers.
+$(BUILD)/bus_node.so: $(BUS_NODE_SRCS) $(HOST_HEADERS) Makefile
+	$(call say,CC  $@)
+	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O2 $(BUS_NODE_FLAGS) $(TEST_INCLUDES) -o $@ $(filter %.c,$^)
+
+$(BUILD)/bus_nodes: test/host/test_bus_nodes.c $(BUILD)/bus_node.so $(BUILD)/unity.o $(HOST_HEADERS) Makefile
+	$(call say,CC  $@)
+	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O2 $(UNITY_FLAGS) $(TEST_INCLUDES) -DBUS_NODE_SO='"$(BUILD)/bus_node.so"' -o $@ $(filter %.c %.o,$^) -lm
+
+.PHONY: test-bus-long
+test-bus-long: ## 10^6 commands to 200 nodes on a line that loses 1 packet of 1,000; SAC_BUS_COMMANDS=n, SAC_BUS_LOSS=n, SAC_BUS_SEED=n
+	@$(MAKE) -s --no-print-directory $(BUILD)/bus_nodes
+	@SAC_BUS_COMMANDS=$${SAC_BUS_COMMANDS:-1000000} SAC_BUS_LOSS=$${SAC_BUS_LOSS:-1000} $(BUILD)/bus_nodes
+
 .PHONY: fuzz-image-long
 fuzz-image-long: ## 10^5 damaged lines at the image on the board; SAC_FUZZ_SEED=n makes others, SAC_FUZZ_LINES=n fewer
 	@$(MAKE) -s --no-print-directory $(BUILD)/image/test_image_fuzz $(BUILD)/sac.hex
 	@SAC_FUZZ_LINES=$${SAC_FUZZ_LINES:-100000} $(BUILD)/image/test_image_fuzz
+
+.PHONY: test-nodes-long
+test-nodes-long: ## 10^4 commands to three images on a line that loses packets (a minute); SAC_NODE_COMMANDS=n, SAC_NODE_LOSS=n
+	@$(MAKE) -s --no-print-directory $(BUILD)/image/test_image_nodes $(BUILD)/sac.hex
+	@SAC_NODE_COMMANDS=$${SAC_NODE_COMMANDS:-10000} $(BUILD)/image/test_image_nodes
 
 .PHONY: test-processor
 test-processor: ## 2,000 random scripts on the image and on the model of the command processor

@@ -59,6 +59,9 @@ void row_jitter(result_t *result);
 void row_ramp_error(result_t *result);
 void row_first_pulse(result_t *result);
 void row_streaming(result_t *result);
+void row_packets(result_t *result);
+void row_skew(result_t *result);
+void row_estop(result_t *result);
 void row_periods(result_t *result);
 void row_memory(result_t *result);
 void row_isr_paths(result_t *result);
@@ -119,6 +122,8 @@ typedef struct {
 report_t run_report(run_t *run);
 
 uint64_t run_interval(const run_t *run, size_t k); /* between pulse k and k + 1 */
+/* Largest distance of any edge from the grid that the first one begins. */
+uint64_t run_grid_error(const run_t *run, uint64_t ticks);
 
 void die(const char *format, ...) __attribute__((noreturn, format(printf, 1, 2)));
 

@@ -3,4 +3,4 @@
 
 BENCH ?=
 BENCH_SRCS := $(addprefix test/bench/, bench.c run.c ideal.c image_file.c rows_rate.c rows_time.c rows_load.c \
-    rows_error.c)
+    rows_error.c rows_bus.c)

@@ -21,19 +21,6 @@ static double rate_khz(const rate_t *rate)
     return (double)TICKS_PER_S / rate_ticks(rate) / 1000.0;
 }
 
-/* Largest distance of any edge from the grid that the first one begins. */
-static uint64_t grid_error(const run_t *run, uint64_t ticks)
-{
-    uint64_t most = 0;
-    for (size_t k = 0; k < run->pulses; k++) {
-        uint64_t ideal = run->rise[0] + k * ticks;
-        uint64_t off = run->rise[k] > ideal ? run->rise[k] - ideal : ideal - run->rise[k];
-        if (off > most)
-            most = off;
-    }
-    return most;
-}
-
 /* A motion of so few pulses has no run that could be reloaded in time: its intervals are stretched where they are below
  * 96 ticks (docs/design.md). That is printed, not judged. */
 static unsigned stretched_pulses(const rate_t *rate)
@@ -49,7 +36,7 @@ static bool cruise_kept(result_t *result, const rate_t *rate, unsigned pulses)
     snprintf(text, sizeof text, "m%upvc%ua999d999\n", pulses, rate->cycle_us);
     run_type(&run, text);
     run_until_quiet(&run, TICKS_PER_S / 2, 60 * TICKS_PER_S);
-    uint64_t off = grid_error(&run, rate_ticks(rate));
+    uint64_t off = run_grid_error(&run, rate_ticks(rate));
     report_t report = run_report(&run);
     bool exact = off == 0 || pulses <= stretched_pulses(rate);
     bool kept =
@@ -213,7 +200,7 @@ void row_jitter(result_t *result)
             run_type(&run, text);
             run_flood(&run, FLOOD_SOLID);
             run_until_quiet(&run, TICKS_PER_S / 10, 5 * TICKS_PER_S);
-            uint64_t off = grid_error(&run, rate_ticks(&rates[i]));
+            uint64_t off = run_grid_error(&run, rate_ticks(&rates[i]));
             size_t sent;
             board_uart_received(run.board, &sent);
             unsigned damaged = refused_lines(&run);

@@ -1,8 +1,11 @@
-/* Rows: newline to first pulse, streaming, range of periods. */
+/* Rows: newline to first pulse, streaming, Estop, range of periods. */
 #include "bench.h"
 
 #include <stdio.h>
 #include <string.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #define COUNT_OF(array) (sizeof(array) / sizeof(array)[0])
 
@@ -144,6 +147,66 @@ void row_streaming(result_t *result)
         }
     figure(result, "%llu ticks%s", (unsigned long long)worst, all_exact ? "" : ", counts or faults wrong");
     result->verdict = worst == 0 && all_exact ? VERDICT_MET : VERDICT_NOT_MET;
+}
+
+/* From the edge at Estop to the last rise of clk, at each of so many cycles from here on: one process for each. */
+static int64_t last_rise(run_t *run, unsigned phases)
+{
+    int64_t *after = mmap(NULL, phases * sizeof *after, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+    if (after == MAP_FAILED)
+        die("out of memory");
+    fflush(NULL);
+    for (unsigned i = 0; i < phases; i++) {
+        after[i] = INT64_MAX;
+        pid_t pid = fork();
+        if (pid < 0)
+            die("cannot fork");
+        if (pid == 0) {
+            uint64_t edge = board_cycle(run->board) + i;
+            board_pin_drive_at(run->board, BOARD_PIN('D', 2), 0, edge);
+            run_for(run, phases + TICKS_PER_S / 500);
+            after[i] = (int64_t)run->last_rise - (int64_t)edge;
+            _exit(0);
+        }
+        waitpid(pid, NULL, 0);
+    }
+    int64_t most = INT64_MIN;
+    for (unsigned i = 0; i < phases; i++)
+        most = after[i] > most ? after[i] : most;
+    munmap(after, phases * sizeof *after);
+    return most;
+}
+
+void row_estop(result_t *result)
+{
+    static const struct {
+        const char *line;
+        uint8_t ustep, pulse_us;
+        unsigned pulses; /* before */
+        unsigned phases;
+    } cases[] = {
+        {"m1000000vc30a999d999\n", 0, 2, 5000, 480}, {"m1000000vc10a999d999\n", 0, 2, 5000, 320},
+        {"m1000000vc5a999d999\n", 0, 2, 5000, 320},  {"m1000000vc2a999d999\n", 0, 1, 5000, 320},
+        {"m20000v3000a20d20\n", 0, 2, 20, 1500},     {"m20000vc10a10d10\n", 0, 2, 2000, 1500},
+        {"m60000vc3a10d10\n", 0, 1, 9500, 1500},     {"m60000vc5a10d10\n", 1, 1, 11000, 1500},
+        {"m60000vc5a500d500l1\n", 0, 2, 3000, 1500},
+    };
+    int64_t worst = INT64_MIN;
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
+        run_t run;
+        run_begin(&run, (setup_t){.ustep = cases[i].ustep, .pulse_us = cases[i].pulse_us, .baud = 250000});
+        run_type(&run, cases[i].line);
+        run_flood(&run, FLOOD_ANSWERED);
+        if (!run_until_pulses(&run, cases[i].pulses, 60 * TICKS_PER_S))
+            die("no motion from %s", cases[i].line);
+        int64_t most = last_rise(&run, cases[i].phases);
+        detail(result, "- `%.*s`, microsteps %u: %lld cycles\n", (int)strlen(cases[i].line) - 1, cases[i].line,
+               1u << cases[i].ustep, (long long)most);
+        worst = most > worst ? most : worst;
+        run_end(&run, &result->worst);
+    }
+    figure(result, "%.2f µs at most", (double)worst / TICKS_PER_US);
+    result->verdict = worst <= 3 * (int64_t)TICKS_PER_US ? VERDICT_MET : VERDICT_NOT_MET;
 }
 
 /* All intervals of `pulses` pulses at one period are exact. */

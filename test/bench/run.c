@@ -204,3 +204,15 @@ uint64_t run_interval(const run_t *run, size_t k)
 {
     return run->rise[k + 1] - run->rise[k];
 }
+
+uint64_t run_grid_error(const run_t *run, uint64_t ticks)
+{
+    uint64_t most = 0;
+    for (size_t k = 0; k < run->pulses; k++) {
+        uint64_t ideal = run->rise[0] + k * ticks;
+        uint64_t off = run->rise[k] > ideal ? run->rise[k] - ideal : ideal - run->rise[k];
+        if (off > most)
+            most = off;
+    }
+    return most;
+}

@@ -124,6 +124,16 @@ static uint64_t bus_cycle_at(const bus_node_t *node, uint64_t board_time_)
     return node->since + (uint64_t)llround((double)(board_time_ - node->board_since) / node->rate);
 }
 
+uint64_t bus_board_cycle(const board_t *b, uint64_t bus_cycle)
+{
+    return board_cycle_at(b->bus_node, bus_cycle);
+}
+
+uint64_t bus_cycle_of(const board_t *b, uint64_t board_cycle_)
+{
+    return bus_cycle_at(b->bus_node, board_cycle_);
+}
+
 static void node_drives(board_t *b, int level, uint64_t cycle)
 {
     bus_node_t *node = b->bus_node;

@@ -34,6 +34,10 @@ board_t *bus_crashed(const bus_t *bus); /* NULL: none */
 /* From now on the node's clock runs so much faster than it should, at most +-20 %. */
 void bus_skew(bus_t *bus, board_t *b, double percent);
 
+/* The cycle of the board's own clock at that cycle of the bus, from the last bus_skew() on; and the other way round. */
+uint64_t bus_board_cycle(const board_t *b, uint64_t bus_cycle);
+uint64_t bus_cycle_of(const board_t *b, uint64_t board_cycle);
+
 int bus_level(const bus_t *bus);            /* as it is heard */
 unsigned bus_drivers(const bus_t *bus);     /* how many drive it, peers included */
 uint32_t bus_contentions(const bus_t *bus); /* how many times drivers began to disagree */

@@ -249,6 +249,9 @@ static void test_skewed_node_sends_faster_and_its_clock_runs_ahead(void)
     bus_skew(bus, node[0], 2);
     run_bus(1000000);
     TEST_ASSERT_INT_WITHIN(8, 1020000, (int)(board_cycle(node[0]) - before));
+    TEST_ASSERT_INT_WITHIN(8, 0, (int)(board_cycle(node[0]) - bus_board_cycle(node[0], bus_cycle(bus))));
+    TEST_ASSERT_EQUAL_UINT64(bus_cycle(bus) + 1000, bus_cycle_of(node[0], bus_board_cycle(node[0], bus_cycle(bus)) + 1020));
+    TEST_ASSERT_EQUAL_UINT64(bus_cycle(bus) + 1000, bus_cycle_of(node[1], bus_board_cycle(node[1], bus_cycle(bus)) + 1000));
     uint64_t gap[2];
     for (int i = 0; i < 2; i++) {
         bus_peer_clear(peer);

@@ -1,5 +1,6 @@
-/* net/packet: bytes to packets and back, and how many damaged packets get through. SAC_PACKETS in the environment sets how
- * many packets are damaged (make test-packet-long: 200). */
+/* net/packet: bytes to packets and back, and how many damaged packets get through. In the environment SAC_PACKETS sets how
+ * many packets are damaged in all ways (make test-packet-long: 200), SAC_FRAMES how many frames and fragments are heard
+ * (make fuzz-packet-long: 10^9), SAC_FRAMES_SEED which. */
 #include "net/packet.h"
 #include <inttypes.h>
 #include <stdio.h>
@@ -536,6 +537,159 @@ static void test_no_bytes_whatever_leave_the_buffer_or_stop_the_next_packet(void
     TEST_ASSERT_GREATER_THAN_UINT64(10000, events[PACKET_BROKEN]);
 }
 
+/* -- frames and fragments ------------------------------------------------------------------------------------------------- */
+
+/* The reference, a byte at a time. */
+static uint8_t crc_table[256];
+
+static uint8_t table_crc(const uint8_t *bytes, size_t count)
+{
+    uint8_t crc = 0;
+    while (count-- > 0) {
+        crc = crc_table[crc ^ *bytes++];
+    }
+    return crc;
+}
+
+/* What the decoder has been given, so that each of its words can be checked against it. */
+enum { HEARD_BYTES = 4096 };
+static uint8_t heard[HEARD_BYTES];
+static size_t heard_count;
+
+/* Whether the last bytes on the line are this packet, from its STX on. */
+static bool was_heard(const packet_t *p, bool strict, bool right)
+{
+    for (unsigned with_crc = strict ? 1 : 0; with_crc < 2; with_crc++) {
+        const size_t bytes = p->length + 5u + with_crc;
+        if (bytes > heard_count) {
+            continue;
+        }
+        const uint8_t *at = heard + heard_count - bytes;
+        const bool frame = at[0] == PACKET_STX && at[1] == p->destination && at[2] == p->origin &&
+                           memcmp(at + 3, p->body, p->length) == 0 && at[3 + p->length] == PACKET_ETX && at[bytes - 1] == '\0';
+        const uint8_t sum = strict ? table_crc(at + 1, p->length + 2u) : table_crc(at + 3, p->length);
+        if (frame && (with_crc ? (at[bytes - 2] == sum) == right : right)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+typedef struct {
+    packet_t packet;
+    uint8_t behind[8];
+} guarded_t;
+
+static packet_event_t hear(packet_t *p, uint8_t byte, bool strict)
+{
+    if (heard_count == HEARD_BYTES) {
+        memcpy(heard, heard + HEARD_BYTES - 128, 128);
+        heard_count = 128;
+    }
+    heard[heard_count++] = byte;
+    const packet_event_t event = packet_take(p, byte, OWN, strict);
+    if (event == PACKET_WHOLE || event == PACKET_WRONG) {
+        TEST_ASSERT_TRUE(p->length >= 1 && p->length <= PACKET_BODY_BYTES && p->body[p->length] == '\0');
+        TEST_ASSERT_TRUE(p->destination == OWN || p->destination == PACKET_EVERYBODY);
+        TEST_ASSERT_TRUE(was_heard(p, strict, event == PACKET_WHOLE));
+    }
+    return event;
+}
+
+/* A frame with an address of this node, of everybody or another one; most bodies are short. Returns its length. */
+static size_t make_frame(uint8_t *frame, bool strict, bool crc, bool *mine)
+{
+    const uint32_t r = random_u32();
+    const unsigned length = 1 + ((r & 15) == 0 ? below(PACKET_BODY_BYTES) : below(12));
+    *mine = (r >> 4 & 3) != 0;
+    frame[0] = PACKET_STX;
+    frame[1] = *mine ? (r >> 4 & 3) == 3 ? PACKET_EVERYBODY : OWN : (uint8_t)(r >> 8);
+    *mine = frame[1] == OWN || frame[1] == PACKET_EVERYBODY;
+    frame[2] = (uint8_t)(r >> 16);
+    for (unsigned i = 0; i < length; i += 4) {
+        const uint32_t bytes = random_u32();
+        for (unsigned j = 0; j < 4 && i + j < length; j++) {
+            const uint8_t byte = (uint8_t)(bytes >> 8 * j);
+            frame[3 + i + j] = byte <= PACKET_ETX ? 'm' : byte;
+        }
+    }
+    size_t count = 3 + length;
+    const uint8_t sum = strict ? table_crc(frame + 1, count - 1) : table_crc(frame + 3, length);
+    frame[count++] = PACKET_ETX;
+    if (strict || (crc && sum != 0)) {
+        frame[count++] = sum;
+    }
+    frame[count++] = '\0';
+    return count;
+}
+
+/* The decoder says WHOLE or WRONG for what was on the line and only for that, and WHOLE for each undamaged frame that
+ * begins while it expects none. The sanitizers watch. */
+static void test_frames_and_fragments_are_taken_for_what_they_are(void)
+{
+    const char *text = getenv("SAC_FRAMES");
+    const uint64_t frames = text != NULL ? strtoull(text, NULL, 10) : 500000;
+    const char *seed = getenv("SAC_FRAMES_SEED");
+    state = seed != NULL ? strtoull(seed, NULL, 10) : 3;
+    for (unsigned i = 0; i < 256; i++) {
+        const uint8_t byte = (uint8_t)i;
+        crc_table[i] = reference_crc(&byte, 1);
+    }
+    guarded_t guarded;
+    memset(&guarded, 0, sizeof guarded);
+    memset(guarded.behind, 0xA5, sizeof guarded.behind);
+    packet_t *p = &guarded.packet;
+    heard_count = 0;
+    uint64_t events[PACKET_BROKEN + 1] = {0}, undamaged = 0;
+    bool strict = false;
+    for (uint64_t i = 0; i < frames; i++) {
+        uint8_t frame[PACKET_BODY_BYTES + 6];
+        bool mine;
+        if ((i & 0xFFFF) == 0) {
+            strict = i >> 16 & 1;
+            (void)packet_end(p, OWN, strict);
+            if (i % 100000000 < 0x10000 && i != 0) {
+                printf("%" PRIu64 " frames so far\n", i);
+                fflush(stdout);
+            }
+        }
+        const uint32_t r = random_u32();
+        const size_t count = make_frame(frame, strict, (r & 1) != 0, &mine);
+        if ((r >> 1 & 3) == 0) {
+            events[packet_end(p, OWN, strict)]++; /* a silence in front of it */
+            heard_count = 0;
+        }
+        const bool idle = !packet_under_way(p);
+        size_t from = 0, to = count;
+        bool damage_it = true;
+        switch (r >> 3 & 7) {
+        case 0: from = 1 + below((uint32_t)count - 1); break; /* its end */
+        case 1: to = 1 + below((uint32_t)count - 1); break;   /* its beginning */
+        case 2: frame[below((uint32_t)count)] ^= (uint8_t)(1u << (r >> 8 & 7)); break;
+        case 3: frame[below((uint32_t)count)] = (uint8_t)(r >> 8 & 1 ? r >> 16 & 3 : r >> 16); break;
+        default: damage_it = false;
+        }
+        packet_event_t last = PACKET_NONE;
+        for (size_t at = from; at < to; at++) {
+            last = hear(p, frame[at], strict);
+            events[last]++;
+        }
+        if (!damage_it && idle) {
+            TEST_ASSERT_EQUAL(mine ? PACKET_WHOLE : PACKET_NONE, last);
+            undamaged++;
+        }
+    }
+    for (size_t i = 0; i < sizeof guarded.behind; i++) {
+        TEST_ASSERT_EQUAL_HEX8(0xA5, guarded.behind[i]);
+    }
+    printf("%" PRIu64 " frames and fragments, %" PRIu64 " of them undamaged and in order: %" PRIu64 " packets whole, %" PRIu64
+           " wrong, %" PRIu64 " broken\n",
+           frames, undamaged, events[PACKET_WHOLE], events[PACKET_WRONG], events[PACKET_BROKEN]);
+    TEST_ASSERT_GREATER_THAN_UINT64(frames / 4, events[PACKET_WHOLE]);
+    TEST_ASSERT_GREATER_THAN_UINT64(frames / 100, events[PACKET_WRONG]);
+    TEST_ASSERT_GREATER_THAN_UINT64(frames / 100, events[PACKET_BROKEN]);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -557,5 +711,6 @@ int main(void)
     RUN_TEST(test_of_damaged_strict_packets_none_is_accepted_but_of_two_bits_127_apart);
     RUN_TEST(test_of_damaged_packets_as_the_manual_has_them_some_are_accepted);
     RUN_TEST(test_no_bytes_whatever_leave_the_buffer_or_stop_the_next_packet);
+    RUN_TEST(test_frames_and_fragments_are_taken_for_what_they_are);
     return UNITY_END();
 }

@@ -11,6 +11,7 @@
 #define MOST_CHANGES 4096
 
 board_t *board;
+bus_t *image_bus;
 train_t train;
 change_t changes[MOST_CHANGES];
 size_t change_count;
@@ -170,9 +171,9 @@ void image_assert_states(const char *expected)
 
 void image_run(uint64_t cycles)
 {
-    uint64_t end = board_cycle(board) + cycles;
-    board_run_t how =
-        tracing ? board_run_until(board, note_state, NULL, end - board_cycle(board)) : board_run_to(board, end);
+    board_run_t how = image_bus ? bus_run_for(image_bus, cycles)
+                      : tracing ? board_run_until(board, note_state, NULL, cycles)
+                                : board_run_for(board, cycles);
     if (how == BOARD_CRASHED)
         image_fail("crashed at cycle %" PRIu64 ": %s", board_cycle(board), board_crash(board));
 }

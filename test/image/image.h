@@ -3,7 +3,8 @@
  * Units:   cycles of 62.5 ns (16 a microsecond), also called ticks; intervals are measured between rising edges of clk.
  * Errors:  everything here that can go wrong fails the running test and says what was expected, what was seen, and at
  *          which pulse, cycle or byte they part.
- * One board at a time: image_power_on() makes it, image_off() (in tearDown) takes it away. */
+ * One board at a time: image_power_on() makes it, image_off() (in tearDown) takes it away. Others that were made before stay,
+ * and the oscilloscope sees the pulses of all of them. */
 #ifndef TEST_IMAGE_H
 #define TEST_IMAGE_H
 
@@ -11,7 +12,7 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <unity.h>
-#include "board/board.h"
+#include "board/bus.h"
 #include "settings.h"
 
 #define US 16ull /* cycles */
@@ -29,6 +30,7 @@
 enum { STANDBY, ACCEL, CRUISE, DECEL, STOP };
 
 extern board_t *board;
+extern bus_t *image_bus; /* not NULL: it runs the board, and others with it (no image_trace() then) */
 
 void image_fail(const char *format, ...) __attribute__((format(printf, 1, 2), __noreturn__));
 

@@ -13,6 +13,7 @@
 
 #define ESTOP BOARD_PIN('D', 2)
 #define SYNC BOARD_PIN('D', 3)
+#define SW_RX BOARD_PIN('D', 4)
 #define LONG_WAIT (600 * SECOND)
 #define MOST_CYCLES 48 /* 3 us */
 
@@ -374,6 +375,69 @@ static void test_sync_starts_within_a_microsecond_of_a_fixed_time(void)
     spread("receiving", "m10svc1000a999d999", true, 0);
 }
 
+static uint16_t receive_head; /* of USART0's ring */
+
+static bool head_is_not(board_t *b, void *head)
+{
+    return board_peek8(b, receive_head) != *(uint8_t *)head;
+}
+
+/* From board_uart_send() to the end of its interrupt's work, about. */
+static uint64_t reception(void)
+{
+    TEST_ASSERT_TRUE(board_symbol(board, "usart_port", &receive_head));
+    uint8_t head = board_peek8(board, receive_head);
+    uint64_t from = board_cycle(board);
+    image_send("v");
+    TEST_ASSERT_EQUAL(BOARD_MATCHED, board_run_until(board, head_is_not, &head, 5 * MS));
+    uint64_t took = board_cycle(board) - from;
+    image_send("\r");
+    image_run(10 * MS);
+    return took;
+}
+
+/* At each cycle around the moment when another interrupt is due: the time base's; a byte is there; a start edge comes. */
+static void test_sync_that_coincides_with_another_interrupt_is_a_microsecond_late_at_most(void)
+{
+    enum { OVERFLOW, BYTE, START_EDGE, THINGS };
+    enum { TCNT0 = 0x46 };
+    uint64_t least = UINT64_MAX, most = 0;
+    boot(38400, 0, 2);
+    uint64_t took = reception();
+    for (unsigned thing = OVERFLOW; thing < THINGS; thing++) {
+        for (unsigned k = 0; k < 200; k++) {
+            image_do("m10svc1000a999d999");
+            image_train_clear();
+            image_run(2 * MS);
+            uint64_t due = 8 * (256u - board_peek8(board, TCNT0)); /* the time base's, within 8 cycles */
+            uint64_t edge = board_cycle(board) + (thing == BYTE ? took - 90 : due + 2048 - 30) + k;
+            if (thing == BYTE) {
+                image_send("v");
+            } else if (thing == START_EDGE) {
+                board_pin_drive_at(board, SW_RX, 0, edge + 50 - k);
+                board_pin_drive_at(board, SW_RX, 1, edge + 100 * US);
+            }
+            board_pin_drive_at(board, SYNC, 0, edge);
+            board_pin_drive_at(board, SYNC, 1, edge + 10 * US);
+            image_run(edge - board_cycle(board) + 500 * US);
+            if (train.count == 0)
+                image_fail("thing %u, cycle %u: no pulse", thing, k);
+            uint64_t delay = train.pulse[0].cycle - edge;
+            least = delay < least ? delay : least;
+            most = delay > most ? delay : most;
+            image_send("\r");
+            image_idle(LONG_WAIT);
+        }
+        printf("sync to first pulse, with %s: %llu to %llu cycles\n",
+               thing == OVERFLOW ? "the time base"
+               : thing == BYTE   ? "a byte received at USART0"
+                                 : "a start edge at the software port",
+               (unsigned long long)least, (unsigned long long)most);
+    }
+    if (most - least > US)
+        image_fail("expected a spread of 16 cycles at most, saw %llu", (unsigned long long)(most - least));
+}
+
 /* SWT-001, SWT-002 */
 static void test_the_start_wait_counts_from_sync(void)
 {
@@ -416,6 +480,7 @@ int main(void)
     RUN_TEST(test_estop_that_is_low_at_boot_is_active);
     RUN_TEST(test_estop_ends_a_start_wait_and_a_sync_hold);
     RUN_TEST(test_sync_starts_within_a_microsecond_of_a_fixed_time);
+    RUN_TEST(test_sync_that_coincides_with_another_interrupt_is_a_microsecond_late_at_most);
     RUN_TEST(test_the_start_wait_counts_from_sync);
     RUN_TEST(test_y_releases_what_is_held_and_nothing_else);
     return UNITY_END();

@@ -11,7 +11,9 @@
  *   power off and on, reset button; and: reset button, keys ESC ESC ESC
  *   N pulses on clk                  so many since the last such line; the firmware's own count is not asked
  *   DC1 DC2                          these bytes have arrived since the last such line; in answers they are left out
+ *   at the second unit, at the first unit   the terminal is that one's from now on; what it has printed meanwhile follows
  * A block that begins with the version line shows what is printed at power-on.
+ * ```sac two units: on one RS485 line, if the image has packets (if not, the block is left out).
  *
  * SAC_MANUAL_OUT=folder: writes the chapters there, with the answers that came instead of those that differ. */
 #include "image.h"
@@ -26,6 +28,8 @@
 #define ANY "[...]"
 #define DC1 0x11
 #define DC2 0x12
+#define ONE_UNIT "```sac"
+#define TWO_UNITS "```sac two units"
 
 static char *lines[MOST_LINES];
 static size_t line_count;
@@ -36,6 +40,7 @@ static char printed[65536]; /* since the last action, CR, DC1 and DC2 left out *
 static char signals[200];   /* DC1 and DC2 since they were asked for */
 static char prompt[8];
 static unsigned encoder_at;
+static board_t *both[2]; /* of an example with two */
 
 void setUp(void)
 {
@@ -43,6 +48,11 @@ void setUp(void)
 
 void tearDown(void)
 {
+    bus_free(image_bus);
+    image_bus = NULL;
+    if (both[0] != NULL)
+        board_free(board == both[0] ? both[1] : both[0]);
+    both[0] = both[1] = NULL;
     image_off();
 }
 
@@ -205,6 +215,8 @@ static void act(const char *what)
         image_run(MS);
         image_assert_pulses(number);
         image_train_clear();
+    } else if (both[0] != NULL && (strcmp(what, "at the first unit") == 0 || strcmp(what, "at the second unit") == 0)) {
+        board = both[strcmp(what, "at the second unit") == 0];
     } else if (strncmp(what, "DC", 2) == 0) {
         collect();
         if (strcmp(signals[0] ? signals + 1 : "", what) != 0)
@@ -216,6 +228,7 @@ static void act(const char *what)
         image_fail("not known: ... %s", what);
     }
     collect();
+    (void)cut_prompt(); /* behind what came by itself */
 }
 
 /* -- a block -------------------------------------------------------------------------------------------------------- */
@@ -247,11 +260,28 @@ static size_t compare(size_t at, const char *action)
     return at;
 }
 
+static void power_on_two(void)
+{
+    for (size_t i = 0; i < 2; i++) {
+        power_on();
+        until_prompt("power on");
+        both[i] = board;
+    }
+    image_bus = bus_new();
+    bus_join(image_bus, both[0]);
+    bus_join(image_bus, both[1]);
+    board = both[0];
+}
+
 static void test_example(void)
 {
     size_t at = block_at;
-    power_on();
-    until_prompt("power on");
+    if (strcmp(lines[at - 1], TWO_UNITS) == 0) {
+        power_on_two();
+    } else {
+        power_on();
+        until_prompt("power on");
+    }
     image_train_clear();
     if (!is_action(lines[at]))
         at = compare(at, "power on");
@@ -290,6 +320,15 @@ static void read_lines(const char *path)
     fclose(file);
 }
 
+static bool has_packets(void)
+{
+    uint16_t address;
+    board_t *b = board_new(SAC_ELF, NULL);
+    const bool has = b != NULL && board_symbol(b, "bus_packet", &address);
+    board_free(b);
+    return has;
+}
+
 static size_t run_examples(const char *path)
 {
     size_t count = 0;
@@ -298,7 +337,7 @@ static size_t run_examples(const char *path)
     for (size_t at = 0; at < line_count; at++) {
         if (out)
             fprintf(out, "%s\n", lines[at]);
-        if (strcmp(lines[at], "```sac") != 0)
+        if (strcmp(lines[at], ONE_UNIT) != 0 && (strcmp(lines[at], TWO_UNITS) != 0 || !has_packets()))
             continue;
         char name[300];
         snprintf(name, sizeof name, "example_at_%s:%zu", path + strlen(FOLDER), at + 1);
