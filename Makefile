@@ -138,7 +138,11 @@ AVR_TESTS := test_number test_line test_session test_wide test_block test_ramp t
 IMAGE_TESTS := test_image_boot test_image_pins test_image_encoder test_image_motion test_image_queue \
     test_image_sequence test_image_terminal test_image_stop test_image_configure test_image_powercut test_image_system test_image_timing test_image_clock test_image_stress \
     test_image_estop test_image_ops test_image_processor test_image_fuzz test_image_automicro test_image_manual test_image_bus
+# Where the image holds the network:
+IMAGE_TESTS_1 := test_image_network
+IMAGE_TESTS += $(IMAGE_TESTS_$(NETWORK))
 test_image_bus_SRCS := test/image/soft_peer.c
+test_image_network_SRCS := test/image/soft_peer.c test/image/master.c
 test_image_processor_SRCS := test/image/processor_model.c
 # What every whole-image test is linked with.
 IMAGE_COMMON_SRCS := test/image/image.c test/image/model.c
