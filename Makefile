@@ -139,10 +139,11 @@ IMAGE_TESTS := test_image_boot test_image_pins test_image_encoder test_image_mot
     test_image_sequence test_image_terminal test_image_stop test_image_configure test_image_powercut test_image_system test_image_timing test_image_clock test_image_stress \
     test_image_estop test_image_ops test_image_processor test_image_fuzz test_image_automicro test_image_manual test_image_bus
 # Where the image holds the network:
-IMAGE_TESTS_1 := test_image_network
+IMAGE_TESTS_1 := test_image_network test_image_line
 IMAGE_TESTS += $(IMAGE_TESTS_$(NETWORK))
 test_image_bus_SRCS := test/image/soft_peer.c
 test_image_network_SRCS := test/image/soft_peer.c test/image/master.c
+test_image_line_SRCS := test/image/soft_peer.c test/image/master.c
 test_image_processor_SRCS := test/image/processor_model.c
 # What every whole-image test is linked with.
 IMAGE_COMMON_SRCS := test/image/image.c test/image/model.c
@@ -400,6 +401,11 @@ $(BUILD)/packets: test/host/test_packet.c $(test_packet_SRCS) $(BUILD)/unity.o $
 test-packet-long: ## all errors of 1, 2 and 3 bits in 200 packets of the network (some minutes); SAC_PACKETS=n makes others
 	@$(MAKE) -s --no-print-directory $(BUILD)/packets
 	@SAC_PACKETS=$${SAC_PACKETS:-200} $(BUILD)/packets
+
+.PHONY: test-network-long
+test-network-long: ## 10^5 packets on the image at 33 kHz, 10^4 at 100 kHz, the terminal busy; SAC_PACKETS=n makes others
+	@$(MAKE) -s --no-print-directory $(BUILD)/image/test_image_line $(BUILD)/sac.hex
+	@SAC_PACKETS=$${SAC_PACKETS:-100000} $(BUILD)/image/test_image_line
 
 .PHONY: fuzz-image-long
 fuzz-image-long: ## 10^5 damaged lines at the image on the board; SAC_FUZZ_SEED=n makes others, SAC_FUZZ_LINES=n fewer

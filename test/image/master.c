@@ -169,9 +169,11 @@ void master_exchange(const frame_t *frame)
     const uint64_t end = sent_at;
     while (!tx_en() && board_cycle(board) < end + 5 * MS)
         image_run(50 * US);
-    while (tx_en())
+    while (tx_en() && board_cycle(board) < end + SECOND / 10)
         image_run(50 * US);
     image_run(50 * US);
+    if (tx_en())
+        image_fail("Tx En is still high at %" PRIu64, board_cycle(board));
     size_t count;
     const board_uart_byte_t *byte = master_heard(&count);
     if (count != 0) {

@@ -11,6 +11,7 @@
 
 double soft_peer_off;
 unsigned soft_peer_bad;
+size_t soft_peer_flip = SIZE_MAX;
 
 static board_t *board_of;
 static double bit;
@@ -45,10 +46,15 @@ uint64_t soft_peer_send(const void *bytes, size_t count, uint64_t from, double b
     double at = (double)from;
     for (size_t i = 0; i < count; i++) {
         unsigned frame = ((const uint8_t *)bytes)[i] << 1 | 1u << 9;
+        if (soft_peer_flip / 10 == i)
+            frame ^= 1u << soft_peer_flip % 10;
         for (int k = 0; k < 10; k++, at += bit_cycles)
             board_pin_drive_at(board_of, SW_RX, frame >> k & 1, (uint64_t)llround(at));
     }
-    return (uint64_t)llround(at);
+    soft_peer_flip = SIZE_MAX;
+    const uint64_t end = (uint64_t)llround(at);
+    board_pin_drive_at(board_of, SW_RX, 1, end); /* idle, whatever the last bit was */
+    return end;
 }
 
 void soft_peer_level(int level, uint64_t cycle)

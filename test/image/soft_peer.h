@@ -13,6 +13,7 @@
 void soft_peer_begin(board_t *b, double baud); /* both lines idle, nothing seen */
 /* Drives so many bytes back to back from a cycle on, in bits of bit_cycles; returns the end of the last stop bit. */
 uint64_t soft_peer_send(const void *bytes, size_t count, uint64_t from, double bit_cycles);
+extern size_t soft_peer_flip; /* this bit of the next call's bytes, start and stop bits included, goes out inverted */
 void soft_peer_level(int level, uint64_t cycle); /* the line at a cycle in the future: glitches, breaks */
 const char *soft_peer_text(void);                /* what the board has sent, as far as its stop bits are over */
 const board_uart_byte_t *soft_peer_bytes(size_t *count); /* the same, with their cycles */
