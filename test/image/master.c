@@ -151,9 +151,12 @@ const board_uart_byte_t *master_heard(size_t *count)
 
 void master_clear(void)
 {
-    soft_peer_clear();
-    if (terminal == TERMINAL_SOFT)
+    if (terminal == TERMINAL_SOFT) {
+        soft_peer_clear_tx_en();
         board_uart_clear(board);
+    } else {
+        soft_peer_clear();
+    }
 }
 
 static bool tx_en(void)
@@ -225,23 +228,40 @@ void master_assert_ack(void)
 
 /* -- the terminal -------------------------------------------------------------------------------------------------- */
 
+static uint64_t begin_typing(const char *text)
+{
+    if (terminal == TERMINAL_SOFT)
+        return soft_peer_send(text, strlen(text), board_cycle(board) + 50, LINE_BIT);
+    image_send(text);
+    return board_cycle(board) + (uint64_t)(10 * LINE_BIT * (double)strlen(text));
+}
+
 void master_type(const char *text)
 {
-    if (terminal == TERMINAL_SOFT) {
-        const uint64_t end = soft_peer_send(text, strlen(text), board_cycle(board) + 50, LINE_BIT);
-        image_run(end - board_cycle(board));
-        return;
-    }
-    image_send(text);
-    while (board_uart_sending(board))
+    const uint64_t end = begin_typing(text);
+    while (board_cycle(board) < end || (terminal == TERMINAL_USART && board_uart_sending(board)))
         image_run(50 * US);
+}
+
+void master_begin_line(const char *line)
+{
+    char text[100];
+    snprintf(text, sizeof text, "%s\r", line);
+    begin_typing(text);
+}
+
+const char *master_text(void)
+{
+    return terminal == TERMINAL_SOFT ? soft_peer_text() : board_uart_text(board);
 }
 
 const char *master_shown(void)
 {
     static char text[65536];
-    snprintf(text, sizeof text, "%s", terminal == TERMINAL_SOFT ? soft_peer_text() : image_take_text());
+    snprintf(text, sizeof text, "%s", master_text());
     if (terminal == TERMINAL_SOFT)
-        soft_peer_clear();
+        soft_peer_clear_tx();
+    else
+        board_uart_clear(board);
     return text;
 }

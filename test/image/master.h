@@ -56,6 +56,8 @@ typedef struct {
 extern master_measures_t master_measures;
 
 void master_type(const char *text); /* at the terminal; time passes until it is sent */
-const char *master_shown(void);     /* at the terminal, since the last time it was asked */
+void master_begin_line(const char *line); /* and CR; time does not pass */
+const char *master_text(void);      /* shown at the terminal since the last master_shown() */
+const char *master_shown(void);     /* the same, and it is forgotten */
 
 #endif

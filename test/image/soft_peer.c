@@ -113,7 +113,18 @@ const board_edge_t *soft_peer_tx_en(size_t *count)
     return tx_en;
 }
 
+void soft_peer_clear_tx(void)
+{
+    tx_count = 0;
+}
+
+void soft_peer_clear_tx_en(void)
+{
+    tx_en_count = 0;
+}
+
 void soft_peer_clear(void)
 {
-    tx_count = tx_en_count = 0;
+    soft_peer_clear_tx();
+    soft_peer_clear_tx_en();
 }

@@ -18,7 +18,9 @@ void soft_peer_level(int level, uint64_t cycle); /* the line at a cycle in the f
 const char *soft_peer_text(void);                /* what the board has sent, as far as its stop bits are over */
 const board_uart_byte_t *soft_peer_bytes(size_t *count); /* the same, with their cycles */
 const board_edge_t *soft_peer_tx_en(size_t *count);      /* its edges */
-void soft_peer_clear(void);
+void soft_peer_clear_tx(void);
+void soft_peer_clear_tx_en(void);
+void soft_peer_clear(void); /* both */
 
 extern double soft_peer_off;       /* the farthest an edge was from an ideal byte laid among its edges */
 extern unsigned soft_peer_bad;     /* bytes without a stop bit */
