@@ -9,13 +9,12 @@
 
 /* Tx En covers the line from a bit before the first start bit on, and no longer than an interrupt takes behind the last
  * stop bit. */
-#define RISE_LEAST 416
 #define FALL_MOST (20 * US)
-#define SILENCE (20 * LINE_BYTE)
 
 master_measures_t master_measures;
 
 static unsigned terminal, crc_mode;
+static double line_bit;
 static uint64_t sent_from, sent_at; /* first start bit and last stop bit of what the master sends without a gap */
 
 /* -- frames -------------------------------------------------------------------------------------------------------- */
@@ -61,11 +60,24 @@ frame_t master_hex(const char *bytes)
 
 void master_begin(unsigned terminal_at, unsigned mode)
 {
+    master_begin_at(terminal_at, mode, BAUD);
+}
+
+void master_begin_at(unsigned terminal_at, unsigned mode, uint32_t baud)
+{
     terminal = terminal_at;
     crc_mode = mode;
+    line_bit = 16e6 / baud;
     IMAGE_SET(network, terminal);
     IMAGE_SET(crc_mode, mode);
-    soft_peer_begin(board, BAUD);
+    if (terminal == TERMINAL_SOFT) {
+        IMAGE_SET(hw_baud, baud);
+        board_uart_baud(board, baud);
+        soft_peer_begin(board, BAUD);
+    } else {
+        IMAGE_SET(sw_baud, baud);
+        soft_peer_begin(board, baud);
+    }
     sent_from = sent_at = 0;
 }
 
@@ -88,9 +100,9 @@ void master_send(const frame_t *frame)
         sent_from = from;
     if (terminal == TERMINAL_SOFT) {
         board_uart_send(board, frame->byte, frame->count);
-        sent_at = from + (uint64_t)(10 * LINE_BIT * (double)frame->count);
+        sent_at = from + (uint64_t)(10 * line_bit * (double)frame->count);
     } else {
-        sent_at = soft_peer_send(frame->byte, frame->count, from, LINE_BIT);
+        sent_at = soft_peer_send(frame->byte, frame->count, from, line_bit);
     }
 }
 
@@ -115,7 +127,7 @@ static void check_tx_en(const board_uart_byte_t *byte, size_t bytes)
         const uint64_t rise = edge[i - 1].cycle, fall = edge[i].cycle;
         if (n == bytes || byte[n].start_cycle > fall)
             image_fail("Tx En high from %" PRIu64 " to %" PRIu64 " for no byte", rise, fall);
-        if (byte[n].start_cycle < rise + RISE_LEAST)
+        if ((double)byte[n].start_cycle < (double)rise + line_bit - 1)
             image_fail("Tx En rose at %" PRIu64 ", the start bit came at %" PRIu64, rise, byte[n].start_cycle);
         const uint64_t before = byte[n].start_cycle - rise;
         while (n < bytes && byte[n].start_cycle < fall)
@@ -170,9 +182,10 @@ void master_exchange(const frame_t *frame)
     master_send(frame);
     image_run(sent_at - board_cycle(board));
     const uint64_t end = sent_at;
-    while (!tx_en() && board_cycle(board) < end + 5 * MS)
+    const uint64_t answer_by = end + 5 * MS + (uint64_t)(20 * line_bit);
+    while (!tx_en() && board_cycle(board) < answer_by)
         image_run(50 * US);
-    while (tx_en() && board_cycle(board) < end + SECOND / 10)
+    while (tx_en() && board_cycle(board) < answer_by + SECOND / 10 + (uint64_t)(400 * line_bit))
         image_run(50 * US);
     image_run(50 * US);
     if (tx_en())
@@ -185,7 +198,7 @@ void master_exchange(const frame_t *frame)
             master_measures.answer_min = after;
         if (after > master_measures.answer_max)
             master_measures.answer_max = after;
-        if (after < LINE_BYTE)
+        if ((double)after < 10 * line_bit)
             image_fail("the answer came %" PRIu64 " cycles after the packet", after);
     }
 }
@@ -194,16 +207,6 @@ void master_ask(const char *body)
 {
     const frame_t frame = master_frame(UNIT, MASTER, body);
     master_exchange(&frame);
-}
-
-void master_until_silence(void)
-{
-    uint64_t since = board_cycle(board);
-    while (board_cycle(board) < since + SILENCE) {
-        if (tx_en() || board_cycle(board) < sent_at)
-            since = board_cycle(board);
-        image_run(100 * US);
-    }
 }
 
 void master_assert_heard(const char *hex)
@@ -231,9 +234,9 @@ void master_assert_ack(void)
 static uint64_t begin_typing(const char *text)
 {
     if (terminal == TERMINAL_SOFT)
-        return soft_peer_send(text, strlen(text), board_cycle(board) + 50, LINE_BIT);
+        return soft_peer_send(text, strlen(text), board_cycle(board) + 50, 16e6 / BAUD);
     image_send(text);
-    return board_cycle(board) + (uint64_t)(10 * LINE_BIT * (double)strlen(text));
+    return board_cycle(board) + (uint64_t)(160e6 / BAUD * (double)strlen(text));
 }
 
 void master_type(const char *text)

@@ -2,7 +2,7 @@
  *
  * The line is the software port's (D4, D6) or, with the roles exchanged, the hardware port's; Tx En is D7 in both cases.
  * The terminal is at the other one: master_type() and master_shown(), or at the hardware port image.h's functions.
- * Half duplex and at 38,400 Bd. Units: cycles.
+ * Half duplex. Units: cycles.
  * Errors: whatever is sent in front of or behind Tx En, without a stop bit, or while the master sends, fails the test. */
 #ifndef TEST_MASTER_H
 #define TEST_MASTER_H
@@ -15,8 +15,7 @@
 enum { MASTER = 1, UNIT = 85 /* d_id of a unit as it comes from the factory */ };
 enum { TERMINAL_USART, TERMINAL_SOFT };
 
-#define LINE_BIT (16e6 / 38400)
-#define LINE_BYTE 4167ull
+#define LINE_BYTE 4167ull /* at the factory's 38,400 Bd */
 
 typedef struct {
     uint8_t byte[120];
@@ -25,6 +24,8 @@ typedef struct {
 
 /* Between image_power_on() and the first prompt: who is where. crc_mode: the setting k. */
 void master_begin(unsigned terminal, unsigned crc_mode);
+/* The same, with another rate of the line. */
+void master_begin_at(unsigned terminal, unsigned crc_mode, uint32_t baud);
 void master_boot(unsigned terminal, unsigned crc_mode); /* power on, this, and on to the prompt */
 
 /* A packet with the CRC that crc_mode wants, by a sum of the tests' own; bytes as they are written in the documents. */
@@ -36,8 +37,6 @@ void master_send(const frame_t *frame);
 /* Time passes until the frame is sent, and any answer to it has come. */
 void master_exchange(const frame_t *frame);
 void master_ask(const char *body); /* the same, to UNIT */
-/* Time passes until nothing has been on the line for 20 characters. */
-void master_until_silence(void);
 uint64_t master_sent_at(void); /* end of the last stop bit of what the master has sent */
 
 /* What the board has sent on the line since the last frame or master_clear(), with its cycles; Tx En is checked. */

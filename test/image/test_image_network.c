@@ -241,6 +241,38 @@ static void test_tx_en_covers_the_answers_and_no_more(void)
     }
 }
 
+/* NET-006, PIN-016, PIN-017: the ends of what n and m may be, and the motor at 33 kHz */
+static void test_packets_at_every_rate(void)
+{
+    static const struct {
+        unsigned terminal;
+        uint32_t baud;
+    } rates[] = {{TERMINAL_USART, 300},  {TERMINAL_USART, 9600},  {TERMINAL_USART, 19200},  {TERMINAL_SOFT, 300},
+                 {TERMINAL_SOFT, 250000}, {TERMINAL_SOFT, 500000}, {TERMINAL_SOFT, 1000000}, {TERMINAL_SOFT, 2000000}};
+    for (size_t i = 0; i < sizeof rates / sizeof rates[0]; i++) {
+        image_off();
+        image_power_on();
+        master_begin_at(rates[i].terminal, 1, rates[i].baud);
+        image_run(3 * SECOND / 2);
+        image_train_clear();
+        for (unsigned n = 0; n < (rates[i].baud == 300 ? 2 : 20); n++) {
+            master_ask(n % 2 ? "m10vc30a999d999" : "m10vc30a999d999k");
+            master_assert_heard(n % 2 ? "02 01 55 06 03 DD 00" : "02 01 55 15 03 A2 00");
+        }
+        image_idle(SECONDS_10);
+        image_assert_pulses(rates[i].baud == 300 ? 10 : 100);
+        if (rates[i].baud > 250000)
+            continue;
+        image_train_clear();
+        master_ask("m900000vc30a999d999");
+        for (unsigned n = 0; n < (rates[i].baud == 300 ? 2 : 20); n++) {
+            master_ask("y");
+            master_assert_ack();
+        }
+        image_assert_intervals(0, train.count - 1, 30 * US, 0);
+    }
+}
+
 /* PIN-016, PIN-017: the longest line, longer than the port's ring, as one packet without a gap, at 33 kHz too */
 static void test_the_longest_packet_goes_out_without_a_gap(void)
 {
@@ -749,6 +781,7 @@ int main(void)
     RUN_TEST(test_without_acknowledgements_the_line_is_silent);
     RUN_TEST(test_strict_frames_byte_for_byte_and_exactly_once);
     RUN_TEST(test_tx_en_covers_the_answers_and_no_more);
+    RUN_TEST(test_packets_at_every_rate);
     RUN_TEST(test_the_longest_packet_goes_out_without_a_gap);
     RUN_TEST(test_without_a_packet_the_line_is_silent);
     RUN_TEST(test_packets_for_others_are_ignored_silently);
