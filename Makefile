@@ -135,8 +135,11 @@ AVR_TESTS := test_number test_line test_session test_wide test_block test_ramp t
 # Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
 IMAGE_TESTS := test_image_boot test_image_pins test_image_encoder test_image_motion test_image_queue \
     test_image_sequence test_image_terminal test_image_stop test_image_configure test_image_powercut test_image_system test_image_timing test_image_clock test_image_stress \
-    test_image_estop test_image_ops test_image_processor test_image_fuzz test_image_automicro test_image_manual test_image_bus test_image_nodes
+    test_image_estop test_image_ops test_image_processor test_image_fuzz test_image_automicro test_image_manual test_image_bus \
+    test_image_network test_image_line test_image_nodes
 test_image_bus_SRCS := test/image/soft_peer.c
+test_image_network_SRCS := test/image/soft_peer.c test/image/master.c
+test_image_line_SRCS := test/image/soft_peer.c test/image/master.c
 test_image_nodes_SRCS := test/image/nodes.c
 test_image_processor_SRCS := test/image/processor_model.c
 # What every whole-image test is linked with.
@@ -437,6 +440,11 @@ $(BUILD)/bus_nodes: test/host/test_bus_nodes.c $(BUILD)/bus_node.so $(BUILD)/uni
 test-bus-long: ## 10^6 commands to 200 nodes on a line that loses 1 packet of 1,000; SAC_BUS_COMMANDS=n, SAC_BUS_LOSS=n, SAC_BUS_SEED=n
 	@$(MAKE) -s --no-print-directory $(BUILD)/bus_nodes
 	@SAC_BUS_COMMANDS=$${SAC_BUS_COMMANDS:-1000000} SAC_BUS_LOSS=$${SAC_BUS_LOSS:-1000} $(BUILD)/bus_nodes
+
+.PHONY: test-network-long
+test-network-long: ## 10^5 packets on the image at 33 kHz, 10^4 at 100 kHz, the terminal busy; SAC_PACKETS=n makes others
+	@$(MAKE) -s --no-print-directory $(BUILD)/image/test_image_line $(BUILD)/sac.hex
+	@SAC_PACKETS=$${SAC_PACKETS:-100000} $(BUILD)/image/test_image_line
 
 .PHONY: fuzz-image-long
 fuzz-image-long: ## 10^5 damaged lines at the image on the board; SAC_FUZZ_SEED=n makes others, SAC_FUZZ_LINES=n fewer

@@ -146,7 +146,7 @@ static void put(uint8_t hardware, uint8_t byte)
     append(&soft_uart.port, byte);
     if (!soft_sends()) {
         /* The first match, at once, leaves the line high; the start bit comes a bit later. */
-        soft_uart.tx_intervals = 1;
+        soft_uart.tx_intervals = soft_uart.intervals;
         soft_uart.tx_bits = SOFT_TX_LAST;
         const uint8_t state = atomic_begin();
         OCR0A = (uint8_t)(TCNT0 + 3);

@@ -288,7 +288,11 @@ next_byte:                      ; r25: 0xFF or SOFT_TX_LAST - 1
 
 empty:
     cpi  r25, SOFT_TX_LAST - 1
-    brne 1b                     ; the stop bit lasts until the next match
+    breq over
+    std  Z + SOFT_TX_BITS, r25
+    ldi  r25, 1                 ; the stop bit lasts until the next match
+    rjmp 3b
+over:
     INTERRUPT_OFF OCIE0A
     ldd  r24, Z + SOFT_ENDED
     sbrc r24, 0

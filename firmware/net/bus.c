@@ -38,7 +38,8 @@ static NOINLINE void heard(void)
     since_128us = timebase_128us();
 }
 
-/* What is to go out; and when it is, what came in meanwhile is dropped. */
+/* What is to go out. What came in meanwhile waits: it is the echo, and may be the next packet, for the end of one's own can
+ * be long past when it is seen here. */
 static void send(void)
 {
     heard();
@@ -53,8 +54,6 @@ static void send(void)
         bus_port_end();
     }
     if (!bus_port_sending()) {
-        while (bus_port_get() >= 0) {
-        }
         phase = LISTENING;
     }
 }
@@ -66,12 +65,16 @@ NOINLINE packet_event_t bus_poll(void)
         return PACKET_NONE;
     }
     packet_event_t event = PACKET_NONE;
+    const uint8_t own = settings.device_id;
     for (int16_t byte; event == PACKET_NONE && (byte = bus_port_get()) >= 0;) {
         heard();
-        event = packet_take(&bus_packet, (uint8_t)byte, settings.device_id, bus_strict());
+        event = packet_take(&bus_packet, (uint8_t)byte, own, bus_strict());
+        if (bus_packet.origin == own) {
+            event = PACKET_NONE; /* the echo */
+        }
     }
     if (event == PACKET_NONE && packet_under_way(&bus_packet) && silent_for(BUS_SILENCE_CHARACTERS)) {
-        event = packet_end(&bus_packet, settings.device_id, bus_strict());
+        event = packet_end(&bus_packet, own, bus_strict());
     }
     if (event != PACKET_NONE) {
         (&bus_counters.good)[event - PACKET_WHOLE]++;

@@ -1,8 +1,8 @@
 /* The bus: packets in and out, one at a time, half duplex.
  *
  * One buffer serves both ways. A packet that has been received stays in it until bus_poll() is called again, and what
- * arrives meanwhile waits in the port's ring; a packet is put together in it when the bus is free for it. What arrives
- * while one's own packet goes out is its echo, and dropped.
+ * arrives meanwhile waits in the port's ring; a packet is put together in it when the bus is free for it. An echo of what
+ * was sent is known by its origin.
  * Units:   128 us, characters of the port's rate.
  * Context: main loop. Errors: PACKET_WRONG and PACKET_BROKEN are counted here.
  * Tests:   test/host/test_network.c with test/host/fakes/bus_port_fake.c

@@ -107,6 +107,8 @@ uint32_t board_uart_overruns(const board_t *b); /* bytes lost by the board's rec
 /* -- memory ---------------------------------------------------------------------------------------------------- */
 
 bool board_symbol(const board_t *b, const char *name, uint16_t *address); /* data: RAM address; code: byte address */
+/* The data symbol that begins at this RAM address or nearest below it; "" if there is none. */
+const char *board_symbol_at(const board_t *b, uint16_t address, uint16_t *offset);
 uint8_t board_peek8(const board_t *b, uint16_t address);
 uint16_t board_peek16(const board_t *b, uint16_t address);
 uint32_t board_peek32(const board_t *b, uint16_t address);

@@ -180,6 +180,7 @@ typedef struct {
     char *name;
     uint16_t address;
     bool global;
+    bool data; /* in RAM */
 } board_symbol_t;
 
 struct board {

@@ -90,6 +90,7 @@ static bool load_symbols(board_t *b, Elf *elf, Elf_Scn *scn, const GElf_Shdr *se
             continue;
         b->symbols[b->symbol_count].address = (uint16_t)symbol.st_value;
         b->symbols[b->symbol_count].name = strdup(name);
+        b->symbols[b->symbol_count].data = symbol.st_value >= ELF_RAM && symbol.st_value < ELF_EEPROM;
         b->symbols[b->symbol_count].global = GELF_ST_BIND(symbol.st_info) != STB_LOCAL;
         b->symbol_count++;
     }
@@ -154,4 +155,18 @@ bool board_symbol(const board_t *b, const char *name, uint16_t *address)
     }
     *address = found->address;
     return true;
+}
+
+const char *board_symbol_at(const board_t *b, uint16_t address, uint16_t *offset)
+{
+    const char *name = "";
+    *offset = UINT16_MAX;
+    for (size_t i = 0; i < b->symbol_count; i++) {
+        const board_symbol_t *s = &b->symbols[i];
+        if (s->data && s->address <= address && address - s->address < *offset) {
+            name = s->name;
+            *offset = (uint16_t)(address - s->address);
+        }
+    }
+    return name;
 }

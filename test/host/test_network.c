@@ -296,6 +296,31 @@ static void test_the_echo_of_what_is_sent_is_dropped(void)
     TEST_ASSERT_EQUAL_UINT(0, bus_counters.good);
 }
 
+/* The main loop may be planning when the answer's last bit leaves, and for some milliseconds more. */
+static void test_a_packet_that_comes_before_the_end_of_the_answer_is_noticed_is_taken(void)
+{
+    for (unsigned echo = 0; echo < 2; echo++) {
+        begin(OWN, 1);
+        bus_port_fake.echo = echo;
+        const frame_t made = frame(OWN, OTHER, "m200");
+        bus_port_fake_receive(made.bytes, made.count);
+        size_t sent = 0;
+        while (sent != 7) {
+            poll_all();
+            timebase_fake_us += 50;
+            (void)bus_port_fake_sent(&sent);
+        }
+        poll_all();
+        timebase_fake_us = bus_port_fake.left_us + 3 * BUS_PORT_FAKE_CHARACTER_US;
+        bus_port_fake_receive(made.bytes, made.count);
+        timebase_fake_us = bus_port_fake.arrived_us + 1;
+        run_ms(40);
+        TEST_ASSERT_EQUAL_UINT(2, engine_fake.submitted_count);
+        assert_sent_bytes("\x02\x0A\x55\x06\x03\xDD\x00\x02\x0A\x55\x06\x03\xDD\x00", 14);
+        TEST_ASSERT_EQUAL_UINT(2, bus_counters.good);
+    }
+}
+
 /* NET-033, A-NET-14 */
 static void test_a_packet_that_stops_is_given_up_after_20_characters(void)
 {
@@ -695,6 +720,7 @@ int main(void)
     RUN_TEST(test_a_command_from_the_network_leaves_what_is_being_typed);
     RUN_TEST(test_the_answer_comes_a_character_after_the_packet_at_least);
     RUN_TEST(test_the_echo_of_what_is_sent_is_dropped);
+    RUN_TEST(test_a_packet_that_comes_before_the_end_of_the_answer_is_noticed_is_taken);
     RUN_TEST(test_a_packet_that_stops_is_given_up_after_20_characters);
     RUN_TEST(test_without_acknowledgements_nothing_is_answered);
     RUN_TEST(test_without_crc_none_is_sent);

@@ -41,7 +41,7 @@ static void least(uint64_t *least_so_far, uint64_t value)
         *least_so_far = value;
 }
 
-static void on_edge(void *ctx, board_edge_t edge)
+void image_on_edge(void *ctx, board_edge_t edge)
 {
     (void)ctx;
     if (edge.pin == DIR) {
@@ -256,7 +256,7 @@ void image_power_on_with(const uint8_t *eeprom)
     state_address = address_of("motion_state");
     board_record(board, CLK, true);
     board_record(board, DIR, true);
-    board_on_edge(board, on_edge, NULL);
+    board_on_edge(board, image_on_edge, NULL);
     dir_level = 0;
     image_train_clear();
     image_load_settings();

@@ -94,6 +94,7 @@ typedef struct {
 } train_t;
 
 extern train_t train; /* since image_train_clear() */
+void image_on_edge(void *ctx, board_edge_t edge); /* for who takes the board's edges himself, and passes on these */
 void image_train_clear(void);
 uint64_t image_interval(size_t k); /* from pulse k to pulse k + 1 */
 

@@ -19,8 +19,6 @@ static void boot_at(uint32_t baud)
     image_run(3 * SECOND / 2 + (uint64_t)(2000 * bit));
     if (strstr(soft_peer_text(), "SAC>") == NULL)
         image_fail("expected the prompt, saw \"%s\"", soft_peer_text());
-    board_record(board, CLK, false);
-    board_record(board, DIR, false);
     soft_peer_clear();
 }
 
@@ -47,7 +45,9 @@ static void assert_answer(const char *line, double cycles_a_bit, const char *ans
     if (strcmp(soft_peer_text(), answer) != 0)
         image_fail("bit %.2f: expected \"%s\", saw \"%s\"", cycles_a_bit, answer, soft_peer_text());
     TEST_ASSERT_EQUAL_UINT(0, soft_peer_bad);
-    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, soft_peer_enabled, "Tx En");
+    size_t enabled;
+    soft_peer_tx_en(&enabled);
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(0, enabled, "edges of Tx En");
     if (soft_peer_off > 8)
         image_fail("an edge was %.1f cycles off", soft_peer_off);
 }
@@ -67,8 +67,6 @@ static void move_the_terminal(void)
     image_take_text();
     bit = 16e6 / 38400;
     soft_peer_begin(board, 38400);
-    board_record(board, CLK, false);
-    board_record(board, DIR, false);
 }
 
 /* NET-002, NET-003 */
