@@ -481,7 +481,7 @@ static void test_no_answer_is_told_and_none_of_another_node_is_taken(void)
     receive(OWN, 11, "\x06");
     assert_shown("");
     run_ms(ANSWER_MS);
-    assert_shown("\r\n?22 no answer\r\nSAC>");
+    assert_shown("\r\n?9 no answer\r\nSAC>");
     receive(OWN, OTHER, "\x06");
     assert_shown("");
 }
@@ -652,7 +652,7 @@ static void test_another_node_is_greeted(void)
     assert_sent(11, "\x84");
     terminal_port_fake_clear();
     run_ms(ANSWER_MS);
-    assert_shown("\r\n?22 no answer\r\nSAC>");
+    assert_shown("\r\n?9 no answer\r\nSAC>");
     size_t count;
     (void)bus_port_fake_sent(&count);
     TEST_ASSERT_EQUAL_UINT(7, count); /* the line itself was not sent */

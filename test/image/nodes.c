@@ -23,16 +23,6 @@ static void on_edge(void *ctx, board_edge_t edge)
     its->moving = true;
 }
 
-bool nodes_have_packets(void)
-{
-    board_t *b = board_new(SAC_ELF, NULL);
-    TEST_ASSERT_NOT_NULL_MESSAGE(b, SAC_ELF);
-    uint16_t address;
-    const bool have = board_symbol(b, "bus_packet", &address);
-    board_free(b);
-    return have;
-}
-
 void nodes_begin(void)
 {
     bus = bus_new();

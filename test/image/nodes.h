@@ -1,7 +1,6 @@
 /* For the tests of several boards on one RS485 line: images that are ready for commands, a master in strict mode.
  *
- * Units: cycles of the bus (62.5 ns), if nothing else is said. Errors: fail the running test (image_fail()).
- * An image without the network has no packets; what does not need them works with it as well. */
+ * Units: cycles of the bus (62.5 ns), if nothing else is said. Errors: fail the running test (image_fail()). */
 #ifndef TEST_NODES_H
 #define TEST_NODES_H
 
@@ -20,8 +19,6 @@ typedef struct {
 extern bus_t *bus;
 extern node_t node[MOST_NODES];
 extern unsigned node_count;
-
-bool nodes_have_packets(void); /* the image was built with NETWORK=1 */
 
 /* A board that has started, with this address and k CRC; its clock so many parts in a million too fast. */
 void nodes_begin(void);

@@ -520,7 +520,7 @@ static void test_a_line_with_an_address_goes_out_and_its_answer_is_shown(void)
     receive("02 0A 55 06 03 DD 00"); /* another node's answer */
     assert_shown("254y\r\nSAC>");
     image_run(60 * MS);
-    assert_shown("\r\n?22 no answer\r\nSAC>");
+    assert_shown("\r\n?9 no answer\r\nSAC>");
     type("0y\r", "02 00 0A 79 03 64 00");
     image_run(200 * MS);
     assert_shown("0y\r\nSAC>");
