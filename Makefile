@@ -143,7 +143,7 @@ IMAGE_TESTS_1 := test_image_network test_image_line
 IMAGE_TESTS += $(IMAGE_TESTS_$(NETWORK))
 test_image_bus_SRCS := test/image/soft_peer.c
 test_image_network_SRCS := test/image/soft_peer.c test/image/master.c
-test_image_line_SRCS := test/image/soft_peer.c test/image/master.c
+test_image_line_SRCS := test/image/soft_peer.c test/image/master.c test/fuzz/grammar.c
 test_image_processor_SRCS := test/image/processor_model.c
 # What every whole-image test is linked with.
 IMAGE_COMMON_SRCS := test/image/image.c test/image/model.c

@@ -2,6 +2,7 @@
  *
  * SAC_PACKETS in the environment sets how many packets are exchanged while the motor cruises at 33 kHz (a tenth of them
  * at 100 kHz); make test-network-long: 100,000. */
+#include "fuzz/grammar.h"
 #include "image.h"
 #include "master.h"
 #include "net/packet.h"
@@ -192,6 +193,56 @@ static void test_manual_packets_with_a_wrong_bit_are_not_executed(void)
         TEST_ASSERT_EQUAL_STRING("", master_shown());
     }
     printf("%u manual packets with a wrong bit, %u answered with NAK\n", packets, naks);
+}
+
+/* Lines of all kinds, whole and damaged, as packets, to the unit and to everybody: each is answered once, with ACK or
+ * NAK, or not at all, shows nothing but messages, and the unit goes on. */
+static void test_any_line_as_a_packet_is_answered_once(void)
+{
+    static fuzz_t fuzz;
+    static fuzz_line_t line;
+    unsigned acks = 0, naks = 0;
+    master_boot(TERMINAL_USART, 1);
+    master_patience = 20 * MS; /* docs/wire-format.md, where commands are planned */
+    fuzz_begin(&fuzz, 7);
+    fuzz.brisk = true;
+    while (acks + naks < 400) {
+        char body[66];
+        size_t length = 0;
+        fuzz_line(&fuzz, &line);
+        for (unsigned i = 0; i < line.length && length < 64; i++)
+            if (line.bytes[i] != 0 && line.bytes[i] != 2 && line.bytes[i] != 3)
+                body[length++] = (char)line.bytes[i];
+        body[length] = '\0';
+        const char first = body[0];
+        if (length == 0 || first == '$' || first == ' ' || first == '.' || first == 6 || first == 0x15 || first == 0x11 ||
+            first == 0x12) /* a system command may change how it is answered; messages take time; these are answers */
+            continue;
+        const bool to_all = rand() % 8 == 0;
+        const frame_t frame = master_frame(to_all ? 0 : UNIT, MASTER, body);
+        master_exchange(&frame);
+        size_t count;
+        const board_uart_byte_t *byte = master_heard(&count);
+        if (count != (to_all ? 0 : 7))
+            image_fail("%s: %zu bytes", fuzz_printable(line.bytes, line.length), count);
+        if (to_all)
+            continue;
+        acks += byte[3].byte == 6;
+        naks += byte[3].byte == 0x15;
+        TEST_ASSERT_EQUAL_STRING("", master_shown());
+    }
+    printf("%u lines accepted, %u refused\n", acks, naks);
+    TEST_ASSERT_GREATER_THAN(50, acks);
+    TEST_ASSERT_GREATER_THAN(50, naks);
+    master_ask("x");
+    master_ask("S");
+    master_assert_ack();
+    image_run(100 * MS);
+    image_train_clear();
+    master_ask("m10v600a999d999u0");
+    master_assert_ack();
+    image_idle(10 * SECOND);
+    image_assert_pulses(10);
 }
 
 /* -- a mad line ---------------------------------------------------------------------------------------------------------- */
@@ -573,6 +624,7 @@ int main(void)
     RUN_TEST(test_packets_for_others_leave_nothing_in_ram);
     RUN_TEST(test_strict_packets_with_a_wrong_bit_leave_nothing_in_ram);
     RUN_TEST(test_manual_packets_with_a_wrong_bit_are_not_executed);
+    RUN_TEST(test_any_line_as_a_packet_is_answered_once);
     RUN_TEST(test_a_mad_line_moves_no_pulse_and_is_forgotten_when_it_is_silent);
     RUN_TEST(test_no_packet_is_lost_while_the_motor_cruises_at_33_khz);
     RUN_TEST(test_no_packet_is_lost_while_the_motor_cruises_at_100_khz);
