@@ -139,7 +139,7 @@ IMAGE_TESTS := test_image_boot test_image_pins test_image_encoder test_image_mot
     test_image_network test_image_line test_image_nodes
 test_image_bus_SRCS := test/image/soft_peer.c
 test_image_network_SRCS := test/image/soft_peer.c test/image/master.c
-test_image_line_SRCS := test/image/soft_peer.c test/image/master.c
+test_image_line_SRCS := test/image/soft_peer.c test/image/master.c test/fuzz/grammar.c
 test_image_nodes_SRCS := test/image/nodes.c
 test_image_processor_SRCS := test/image/processor_model.c
 # What every whole-image test is linked with.

@@ -12,6 +12,7 @@
 #define FALL_MOST (20 * US)
 
 master_measures_t master_measures;
+uint64_t master_patience;
 
 static unsigned terminal, crc_mode;
 static double line_bit;
@@ -68,6 +69,7 @@ void master_begin_at(unsigned terminal_at, unsigned mode, uint32_t baud)
     terminal = terminal_at;
     crc_mode = mode;
     line_bit = 16e6 / baud;
+    master_patience = 5 * MS;
     IMAGE_SET(network, terminal);
     IMAGE_SET(crc_mode, mode);
     if (terminal == TERMINAL_SOFT) {
@@ -182,7 +184,7 @@ void master_exchange(const frame_t *frame)
     master_send(frame);
     image_run(sent_at - board_cycle(board));
     const uint64_t end = sent_at;
-    const uint64_t answer_by = end + 5 * MS + (uint64_t)(20 * line_bit);
+    const uint64_t answer_by = end + master_patience + (uint64_t)(20 * line_bit);
     while (!tx_en() && board_cycle(board) < answer_by)
         image_run(50 * US);
     while (tx_en() && board_cycle(board) < answer_by + SECOND / 10 + (uint64_t)(400 * line_bit))

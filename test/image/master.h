@@ -34,7 +34,9 @@ frame_t master_hex(const char *bytes);
 
 /* From now on or from behind what is still being sent; time does not pass. */
 void master_send(const frame_t *frame);
-/* Time passes until the frame is sent, and any answer to it has come. */
+/* Time passes until the frame is sent, and any answer to it has come; one that has not begun after master_patience is not
+ * awaited: 5 ms unless a test says otherwise, and 20 characters. */
+extern uint64_t master_patience;
 void master_exchange(const frame_t *frame);
 void master_ask(const char *body); /* the same, to UNIT */
 uint64_t master_sent_at(void); /* end of the last stop bit of what the master has sent */

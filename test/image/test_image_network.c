@@ -577,6 +577,28 @@ static void test_messages_go_both_ways(void)
     image_assert_pulses(0);
 }
 
+/* NET-020, NET-034: a message is answered when it has been shown (docs/wire-format.md) */
+static void test_a_long_message_is_answered_when_it_has_been_shown(void)
+{
+    static const struct {
+        char c;
+        unsigned most_ms;
+    } messages[] = {{'x', 16}, {7, 65}};
+    for (size_t i = 0; i < 2; i++) {
+        char body[62] = " ";
+        memset(body + 1, messages[i].c, 60);
+        const frame_t frame = master_frame(UNIT, MASTER, body);
+        master_clear();
+        master_send(&frame);
+        image_run(master_sent_at() - board_cycle(board) + 100 * MS);
+        master_assert_ack();
+        size_t count;
+        const uint64_t after = master_heard(&count)[0].start_cycle - master_sent_at();
+        if (after > messages[i].most_ms * MS)
+            image_fail("answered %.1f ms after the packet", (double)after / MS);
+    }
+}
+
 /* NET-015, NET-016, NET-017 */
 static void test_a_slash_answers_who_wrote_last(void)
 {
@@ -796,6 +818,7 @@ int main(void)
     RUN_TEST(test_a_line_with_an_address_goes_out_and_its_answer_is_shown);
     RUN_TEST(test_the_next_line_waits_for_the_answer_or_85_ms);
     RUN_TEST(test_messages_go_both_ways);
+    RUN_TEST(test_a_long_message_is_answered_when_it_has_been_shown);
     RUN_TEST(test_a_slash_answers_who_wrote_last);
     RUN_TEST(test_a_line_typed_while_the_master_speaks_waits);
     RUN_TEST(test_soft_ops_are_packets_to_everybody_and_the_motion_streams_on);
