@@ -235,6 +235,8 @@ static unsigned errors_in(const char *text)
         char letter = 0;
         if (text[2] == '\t')
             continue; /* the help's own row */
+        if (strncmp(text + 2, "9 no answer", 11) == 0)
+            continue; /* to a line for another node, which may be some lines back */
         if (strncmp(text + 2, "12 range 0 or 36", 16) == 0) {
             count++;
             continue;
