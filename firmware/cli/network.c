@@ -257,13 +257,12 @@ NOINLINE uint8_t network_poll(void)
         if (bus_free(BUS_ANSWER_CHARACTERS)) {
             send_answer();
         }
-    } else if (bus_free(BUS_PACKET_CHARACTERS)) {
-        const uint8_t byte = bus_ops_next();
-        if (byte != 0) {
+    } else if ((bus_ops_wait() || commands_restart_due()) && bus_free(BUS_PACKET_CHARACTERS)) {
+        if (bus_ops_wait()) {
             begin_next();
-            text_put_byte(byte);
+            text_put_byte(bus_ops_next());
             send(PACKET_EVERYBODY);
-        } else if (commands_restart_due()) {
+        } else {
             commands_restart();
         }
     }

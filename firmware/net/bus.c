@@ -116,11 +116,13 @@ void bus_ops(uint8_t byte)
     }
 }
 
+bool bus_ops_wait(void)
+{
+    return ops_waiting != 0;
+}
+
 uint8_t bus_ops_next(void)
 {
-    if (ops_waiting == 0) {
-        return 0;
-    }
     ops_waiting--;
     return ops >> ops_waiting & 1 ? PACKET_DC2 : PACKET_DC1;
 }

@@ -45,6 +45,7 @@ void bus_clear(void); /* the counters */
 /* -- soft ops: broadcasts that wait until the bus is free ---------------------------------------------------------- */
 
 void bus_ops(uint8_t byte); /* DC1, DC2; the newest are dropped when 8 are waiting */
-uint8_t bus_ops_next(void); /* the one that has waited longest, taken out; 0: none */
+bool bus_ops_wait(void);
+uint8_t bus_ops_next(void); /* the one that has waited longest, taken out; only while there is one */
 
 #endif
