@@ -36,6 +36,7 @@ UNITY ?= $(firstword $(wildcard .tools/unity /usr/share/cmock/vendor/unity/src) 
 FIRMWARE_SRCS := \
     firmware/hal/step_isr.S \
     firmware/hal/step_snapshot.S \
+    firmware/hal/step_hurry.S \
     firmware/hal/encoder_isr.S \
     firmware/hal/start.S \
     firmware/hal/timebase_isr.S \
@@ -118,7 +119,7 @@ test_fuzz_HOST_SRCS := test/fuzz/grammar.c test/fuzz/reference.c
 test_boot_SRCS := firmware/boot.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 test_drivers_SRCS := firmware/drivers.c
 test_wide_SRCS := firmware/base/wide.S
-test_block_SRCS := firmware/motion/block.c firmware/motion/block.S
+test_block_SRCS := firmware/motion/block.c firmware/motion/block.S firmware/hal/step_hurry.S
 RAMP_SRCS := firmware/motion/ramp.c firmware/base/wide.S
 test_ramp_SRCS := $(RAMP_SRCS)
 test_ramp_HOST_SRCS := test/host/motion_exact.c

@@ -4,8 +4,9 @@
 ; no edge. Samples are taken when their interrupt comes: they aim before the middle of the bit, because the start edge and
 ; the sample can each be late by a step interrupt (23 cycles, at most 123) but never early.
 ;
-; As the others these let interrupts in at once. The start edge masks itself (PCMSK2; PCICR is a constant of
-; encoder_isr.S); a match comes again only where the next one is written, and that is last of all.
+; As the others these let interrupts in at once. The start edge goes before the step interrupt all the same: where that
+; cannot bear it, the main loop takes both receiving interrupts away (step_hurry.S). It masks itself (PCMSK2; PCICR is a
+; constant of encoder_isr.S); a match comes again only where the next one is written, and that is last of all.
 ;
 ;                       flag raised to `sei`   `cli` to end of `reti`   whole run
 ;   start edge          15 cycles masked       9                        73
