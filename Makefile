@@ -36,6 +36,7 @@ UNITY ?= $(firstword $(wildcard .tools/unity /usr/share/cmock/vendor/unity/src) 
 FIRMWARE_SRCS := \
     firmware/hal/step_isr.S \
     firmware/hal/step_snapshot.S \
+    firmware/hal/step_hurry.S \
     firmware/hal/encoder_isr.S \
     firmware/hal/start.S \
     firmware/hal/timebase_isr.S \
@@ -118,7 +119,7 @@ test_fuzz_HOST_SRCS := test/fuzz/grammar.c test/fuzz/reference.c
 test_boot_SRCS := firmware/boot.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 test_drivers_SRCS := firmware/drivers.c
 test_wide_SRCS := firmware/base/wide.S
-test_block_SRCS := firmware/motion/block.c firmware/motion/block.S
+test_block_SRCS := firmware/motion/block.c firmware/motion/block.S firmware/hal/step_hurry.S
 RAMP_SRCS := firmware/motion/ramp.c firmware/base/wide.S
 test_ramp_SRCS := $(RAMP_SRCS)
 test_ramp_HOST_SRCS := test/host/motion_exact.c
@@ -422,6 +423,11 @@ $(BUILD)/packets: test/host/test_packet.c $(test_packet_SRCS) $(BUILD)/unity.o $
 test-packet-long: ## all errors of 1, 2 and 3 bits in 200 packets of the network (some minutes); SAC_PACKETS=n makes others
 	@$(MAKE) -s --no-print-directory $(BUILD)/packets
 	@SAC_PACKETS=$${SAC_PACKETS:-200} $(BUILD)/packets
+
+.PHONY: test-phases-long
+test-phases-long: ## the software port with 25 peers' clocks, at each of the 480 phases of the step interrupt at 33 kHz
+	@$(MAKE) -s --no-print-directory $(BUILD)/image/test_image_bus $(BUILD)/sac.hex
+	@SAC_PHASES=$${SAC_PHASES:-480} $(BUILD)/image/test_image_bus
 
 .PHONY: fuzz-packet-long
 fuzz-packet-long: ## 10^9 frames and fragments into the network's decoder, sanitized (6 minutes); SAC_FRAMES=n makes fewer

@@ -64,6 +64,9 @@ __attribute__((OS_main, section(".init9"))) int main(void)
         if (estop_port_poll()) {
             queue_stop();
         }
+        if (ports_deaf() && !engine_hurries()) {
+            ports_listen();
+        }
         bool worked = false;
         if (boot_over()) {
             if (saved) {

@@ -2,6 +2,7 @@
  * soft_uart_isr.S. One is the terminal's, the other one the network's.
  * Source: ATmega328P datasheet DS40002061, sections 15 (Timer0) and 20 (USART). */
 #include "hal/ports.h"
+#include <avr/interrupt.h>
 #include <avr/io.h>
 #include <stddef.h>
 #include "base/atomic.h"
@@ -83,9 +84,20 @@ void ports_init(void)
         PORTD &= (uint8_t)~_BV(PORT_TX_EN);
     }
     usart_enable(usart_control & _BV(TXCIE0));
-    if (PCMSK2 == 0 && (TIMSK0 & _BV(OCIE0B)) == 0) {
-        PCMSK2 = _BV(PORT_SW_RX); /* at boot; then it is the interrupts' */
+}
+
+bool ports_deaf(void)
+{
+    return PCMSK2 == 0;
+}
+
+void ports_listen(void)
+{
+    cli();
+    if ((TIMSK0 & _BV(OCIE0B)) == 0) { /* otherwise a byte is being received */
+        PCMSK2 = _BV(PORT_SW_RX);
     }
+    sei();
 }
 
 /* -- rings --------------------------------------------------------------------------------------------------------- */

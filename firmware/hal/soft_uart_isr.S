@@ -2,11 +2,12 @@
 ;
 ; Edges of S/W Tx are made by the compare match itself; its interrupt says what the next match does, and a late one moves
 ; no edge. Samples are taken when their interrupt comes: they aim before the middle of the bit, because the start edge and
-; the sample can each be late by a step interrupt (23 cycles, at most 123) but never early.
+; the sample can each be late by a step interrupt (22 cycles, at most 123) but never early.
 ;
-; As the others these let interrupts in at once. The start edge masks itself (PCMSK2; PCICR is a constant of
-; encoder_isr.S); a match comes again only where the next one is written, and that is last of all. A sample that all the
-; others together have held up for a bit finds the next one due, and takes it at once.
+; As the others these let interrupts in at once. The start edge goes before the step interrupt all the same: where that
+; cannot bear it, the main loop takes both receiving interrupts away (step_hurry.S). It masks itself (PCMSK2; PCICR is a
+; constant of encoder_isr.S); a match comes again only where the next one is written, and that is last of all. A sample that
+; all the others together have held up for a bit finds the next one due, and takes it at once.
 ;
 ;                       flag raised to `sei`   `cli` to end of `reti`   whole run
 ;   start edge          15 cycles masked       9                        73

@@ -275,6 +275,18 @@ void step_port_halt(void)
     TCCR1B = MODE15_B;
 }
 
+uint8_t step_port_hurries(void)
+{
+    uint8_t flags = 0;
+    uint8_t head = step_head;
+    uint8_t offset = (uint8_t)(step_tail - SEGMENT_BYTES);
+    if (segment_at(offset)->count_low == GPIOR0)
+        offset = (uint8_t)(offset - SEGMENT_BYTES); /* its first period may be still to come */
+    for (; offset != head; offset = (uint8_t)(offset + SEGMENT_BYTES))
+        flags |= segment_at(offset)->flags;
+    return flags & 1 << SEGMENT_HURRIED_BIT;
+}
+
 void step_port_finish(void)
 {
     while (TIMSK1 || (TCCR1B == RUNNING && !(TIFR1 & 1 << TOV1)))

@@ -128,7 +128,9 @@ unsplit:
         cpi     r24, SEGMENT_EARLY3_BELOW_TICKS - 1
         brsh    6f
         rcall   early
-6:      rcall   put
+6:      sbrc    FLAGS, SEGMENT_HURRIED_BIT
+        call    step_port_hurry
+        rcall   put
         mov     FLAGS, r22
         rjmp    5b
 

@@ -236,10 +236,16 @@ static NOINLINE uint8_t early_periods(const segment_t *s)
 /* The same for periods of top + 1 ticks. */
 static NOINLINE uint8_t early_of(uint16_t top)
 {
-    if (basis.ramp.cycles_log2)
-        return 0; /* no period of an external clock is so short */
-    return (uint8_t)((top < SEGMENT_EARLY1_BELOW_TICKS - 1) + (top < SEGMENT_EARLY2_BELOW_TICKS - 1) +
-                     (top < SEGMENT_EARLY3_BELOW_TICKS - 1));
+    uint8_t early = 0;
+    if (top < SEGMENT_EARLY1_BELOW_TICKS - 1 && !basis.ramp.cycles_log2) { /* no period of an external clock is so short */
+        uint8_t low = (uint8_t)top;
+        early = 1;
+        if (low < SEGMENT_EARLY2_BELOW_TICKS - 1)
+            early = 2;
+        if (low < SEGMENT_EARLY3_BELOW_TICKS - 1)
+            early = 3;
+    }
+    return early;
 }
 
 /* Periods that the interrupt counts: those waited for early are not among them. */
@@ -420,8 +426,11 @@ static NOINLINE void append_run(uint16_t periods, uint16_t ticks, bool pulse, ui
     uint16_t top = (uint16_t)(ticks - 1);
     uint8_t early = early_of(top);
     if (periods > early) {
-        flags = (uint8_t)(flags | early << SEGMENT_EARLY_SHIFT);
         periods = (uint16_t)(periods - early);
+        early = (uint8_t)(early << SEGMENT_EARLY_SHIFT);
+        flags |= early;
+        if (early & 1 << SEGMENT_HURRIED_BIT)
+            step_port_hurry();
     } else {
         top = SEGMENT_EARLY1_BELOW_TICKS - 1;
     }
@@ -1262,6 +1271,11 @@ NOINLINE bool engine_poll(void) /* (the benchmark measures it) */
 {
     /* In standstill a line's end must not wait for all those registers to be saved. */
     return (engine.playing || step_late) && play_on();
+}
+
+uint8_t engine_hurries(void)
+{
+    return engine.playing ? step_port_hurries() : 0;
 }
 
 uint8_t engine_commands_ended(void)

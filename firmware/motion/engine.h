@@ -38,6 +38,9 @@ void engine_release(void);
 /* Keeps the segment ring filled. Call often; returns true if it did some work. */
 bool engine_poll(void);
 
+/* Not 0: periods are being played, or in the ring, that bear no start edge's interrupt before the step interrupt. */
+uint8_t engine_hurries(void);
+
 /* Number of commands ended (completed or cut short) since boot, modulo 256. */
 uint8_t engine_commands_ended(void);
 uint8_t engine_commands_played(void); /* of these, all but those stopped before their first pulse; modulo 256 */

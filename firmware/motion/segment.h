@@ -20,6 +20,7 @@
 #define SEGMENT_STATE_MASK 0x07 /* motion_state_t that the segment belongs to */
 #define SEGMENT_EARLY_SHIFT 3   /* so many periods (2 bits) before its end the reload is begun: they are short */
 #define SEGMENT_EARLY_MASK 0x18
+#define SEGMENT_HURRIED_BIT 4   /* two or three: see step_port_hurry() */
 #define SEGMENT_CCW_BIT 5       /* its pulses count negative */
 #define SEGMENT_DIR_BIT 6       /* level of the dir pin, taken if SET_DIR */
 #define SEGMENT_SET_DIR_BIT 7   /* set dir and MS1 to MS3 at the segment's beginning; such a segment has one period */

@@ -33,6 +33,11 @@ bool step_port_held(void);    /* it stands ready still */
  * the return; step_port_snapshot() then tells where it stopped. */
 void step_port_halt(void);
 
+/* Before a segment with SEGMENT_HURRIED_BIT is put into the ring: its periods bear no start edge's interrupt, which goes
+ * before the step interrupt. */
+void step_port_hurry(void);
+uint8_t step_port_hurries(void); /* not 0: such a segment is running, or in the ring */
+
 /* Waits until all of the ring has been played: for a few microseconds of pulses only. */
 void step_port_finish(void);
 

@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static double bit;
@@ -110,10 +111,19 @@ static void test_no_byte_is_wrong_while_the_motor_steps_at_33_khz(void)
     assert_answer("f1u0\r", bit, "f1u0\r\n?1 unknown command\r\nSAC>");
     assert_answer("m9000000vc30a999d999\r", bit, "m9000000vc30a999d999\r\nSAC>");
     image_run(500 * MS);
-    for (int i = -12; i <= 12; i++) {
-        image_run((uint64_t)(i + 13) * 37); /* another phase */
-        assert_answer("Uvwxyz0123456789\r", bit * (1 + 0.0025 * i), "Uvwxyz0123456789\r\n?1 unknown command\r\nSAC>");
-    }
+    /* All phases of the step interrupt (make test-phases-long), or one for each clock. */
+    const uint64_t period = 480;
+    const unsigned phases = getenv("SAC_PHASES") != NULL ? (unsigned)strtoul(getenv("SAC_PHASES"), NULL, 10) : 1;
+    unsigned lines = 0;
+    for (int i = -12; i <= 12; i++)
+        for (unsigned k = 0; k < phases; k++, lines++) {
+            const uint64_t phase = (period * k / phases + (uint64_t)(i + 12) * 37) % period;
+            image_run(period - board_cycle(board) % period + phase);
+            assert_answer("Uvwxyz0123456789\r", bit * (1 + 0.0025 * i), "Uvwxyz0123456789\r\n?1 unknown command\r\nSAC>");
+        }
+    if (phases > 1)
+        printf("%u lines, clocks off by -3 to 3 %%, %u phases each: all read, edges of S/W Tx off by no more than a tick\n", lines,
+               phases);
 }
 
 static void test_a_glitch_is_no_byte(void)
@@ -142,6 +152,131 @@ static void test_a_break_spoils_one_line_and_does_not_repeat(void)
     assert_answer("p\r", bit, AT_REST);
 }
 
+/* -- at rates that no start edge may come at ---------------------------------------------------------------------- */
+
+static uint32_t dice;
+
+static uint32_t roll(uint32_t sides)
+{
+    dice = dice * 1664525u + 1013904223u;
+    return (dice >> 8) % sides;
+}
+
+/* On S/W Rx for so long: bytes back to back, or pulses of 1 to 20 us as near as that. */
+static void disturb(uint64_t cycles, bool with_bytes)
+{
+    const uint64_t end = board_cycle(board) + cycles;
+    while (board_cycle(board) < end) {
+        uint64_t at = board_cycle(board) + 10;
+        for (unsigned i = 0; i < 16; i++) {
+            const uint8_t byte = (uint8_t)roll(256);
+            if (with_bytes) {
+                at = soft_peer_send(&byte, 1, at + roll(300), 16e6 / 38400);
+                continue;
+            }
+            soft_peer_level(0, at += 16 + roll(320));
+            soft_peer_level(1, at += 16 + roll(320));
+        }
+        image_run(at - board_cycle(board));
+    }
+}
+
+static void boot_fast(unsigned ustep, unsigned network)
+{
+    image_off();
+    image_power_on();
+    IMAGE_SET(pulse_us, 1);
+    IMAGE_SET(ustep, ustep);
+    IMAGE_SET(network, network);
+    bit = 16e6 / 38400;
+    if (network)
+        image_run(2 * SECOND);
+    else
+        image_prompt();
+    soft_peer_begin(board, 38400);
+}
+
+static void assert_counted(const char *lines, size_t pulses)
+{
+    if (train.count != pulses)
+        image_fail("%s: expected %zu pulses, saw %zu", lines, pulses, train.count);
+    TEST_ASSERT_EQUAL_INT32((int32_t)pulses, image_position());
+}
+
+/* Two steps in half the interval of one: 400 kHz is vc5, 500 kHz vc4. */
+static void test_pulses_are_counted_at_500_khz_whatever_comes_at_the_software_port(void)
+{
+    static const struct {
+        unsigned ustep;
+        const char *lines;
+        size_t pulses;
+    } motions[] = {
+        {0, "m600000vc2a999d999\r", 600000},
+        {1, "m300000vc4a999d999\r", 600000},
+        {0, "m300000vc3a999d999\r", 300000}, /* the shortest period that it bears */
+        {1, "m200000vc5a999d999\rm100000vc4a20d999\r", 600000},
+        {1, "m200000vc4a999d999\rm100000vc5a20d999\r", 600000},
+        {1, "m200000vc4a40d40\r", 400000},
+        {1, "m20000vc4a999d999\rm20000vc40a999d999\rm20000vc5a999d999\rm20000vc30a999d999\r", 160000},
+    };
+    for (size_t i = 0; i < sizeof motions / sizeof motions[0]; i++) {
+        for (unsigned phase = 0; phase < 4; phase++) {
+            boot_fast(motions[i].ustep, 0);
+            dice = phase;
+            image_run(phase * 1237);
+            image_train_clear();
+            train.keep = false;
+            image_send(motions[i].lines);
+            do
+                disturb(40 * MS, phase & 1);
+            while (image_peek("motion_state") != STANDBY);
+            image_run(20 * MS);
+            assert_counted(motions[i].lines, motions[i].pulses);
+        }
+    }
+}
+
+/* The middle one of three commands is too fast. */
+static void test_the_software_port_is_deaf_no_longer_than_periods_are_short(void)
+{
+    boot_fast(0, 1);
+    type("m10000vc20a999d999\r", bit);
+    image_until_pulses(1, 10 * MS);
+    type("m50000vc2a999d999\r", bit);
+    type("m10000vc20a999d999\r", bit);
+    image_until_pulses(12000, SECOND);
+    soft_peer_clear();
+    type("m1\r", bit);
+    image_run(20 * MS);
+    TEST_ASSERT_EQUAL_STRING("", soft_peer_text());
+    image_until_pulses(60000, SECOND);
+    image_run(2 * MS);
+    type("p\r", bit);
+    image_run(20 * MS);
+    if (strstr(soft_peer_text(), " CRUISE faults 0") == NULL)
+        image_fail("expected an answer in the third command, saw \"%s\"", soft_peer_text());
+    image_run(SECOND / 2);
+    soft_peer_clear();
+    assert_answer("p\r", bit, "p\r\nposition 70000 STANDBY faults 0\r\nSAC>");
+    type("m100000vc2a999d999\r", bit); /* and it stops from there */
+    image_run(SECOND / 2);
+    assert_answer("p\r", bit, "p\r\nposition 170000 STANDBY faults 0\r\nSAC>");
+}
+
+/* Without a long period at its end. */
+static void test_the_software_port_hears_after_a_stop_at_500_khz(void)
+{
+    enum { PCMSK2 = 0x6D };
+    boot_fast(0, 0);
+    image_send("m600000vc2a999d999\r");
+    image_until_pulses(20000, SECOND);
+    TEST_ASSERT_EQUAL_HEX8(0, board_peek8(board, PCMSK2));
+    image_send("S\r");
+    image_idle(SECOND);
+    TEST_ASSERT_EQUAL_HEX8(1 << 4, board_peek8(board, PCMSK2));
+    TEST_ASSERT_EQUAL_INT32((int32_t)train.count, image_position());
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -151,5 +286,8 @@ int main(void)
     RUN_TEST(test_no_byte_is_wrong_while_the_motor_steps_at_33_khz);
     RUN_TEST(test_a_glitch_is_no_byte);
     RUN_TEST(test_a_break_spoils_one_line_and_does_not_repeat);
+    RUN_TEST(test_pulses_are_counted_at_500_khz_whatever_comes_at_the_software_port);
+    RUN_TEST(test_the_software_port_is_deaf_no_longer_than_periods_are_short);
+    RUN_TEST(test_the_software_port_hears_after_a_stop_at_500_khz);
     return UNITY_END();
 }

@@ -434,6 +434,15 @@ void step_port_clock(bool external)
     (void)external;
 }
 
+void step_port_hurry(void)
+{
+}
+
+uint8_t step_port_hurries(void)
+{
+    return 0;
+}
+
 void step_port_dir(bool level)
 {
     set_dir(p.now, level);
