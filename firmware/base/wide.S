@@ -1,5 +1,5 @@
 /* See wide.h. Cycles with call and return: add, subtract 96; multiply 300; set 25; divide about 140 per byte of the quotient;
- * root 1,200; shift 50 and 11 a bit; copy 80; fraction 80. Little-endian, arguments by the avr-gcc calling convention. */
+ * root 1,200; shift 50 and 11 a bit; copy 80; fraction 65. Little-endian, arguments by the avr-gcc calling convention. */
 
         .section .text.wide_copy, "ax", @progbits
         .global wide_copy
@@ -70,19 +70,13 @@ wide_change:                    /* r24 x, r22 change, r20 add */
         jmp     wide_subtract
 1:      jmp     wide_add
 
-/* \a... += x * y, the carry as far as there are registers. r16 is zero. */
-.macro add_product x, y, a, b, c, d, e
+/* \a... += x * y, the carry as far as there are registers. */
+.macro add_product zero, x, y, a, b, c
         mul     \x, \y
         add     \a, r0
         adc     \b, r1
         .ifnb \c
-        adc     \c, r16
-        .endif
-        .ifnb \d
-        adc     \d, r16
-        .endif
-        .ifnb \e
-        adc     \e, r16
+        adc     \c, \zero
         .endif
 .endm
 
@@ -103,10 +97,10 @@ wide_multiply:                  /* r24 x, r20-r23 factor */
         movw    r26, r16
         ldi     r28, 8          /* bytes */
 1:      ld      r24, Z
-        add_product r24, r20, r26, r27, r17
-        add_product r25, r21, r26, r27, r17
-        add_product r18, r22, r26, r27, r17
-        add_product r19, r23, r26, r27, r17
+        add_product r16, r24, r20, r26, r27, r17
+        add_product r16, r25, r21, r26, r27, r17
+        add_product r16, r18, r22, r26, r27, r17
+        add_product r16, r19, r23, r26, r27, r17
         st      Z+, r26
         mov     r26, r27
         mov     r27, r17
@@ -305,30 +299,30 @@ wide_bits:                      /* r24 x */
         rjmp    2b
 3:      ret
 
-/* Products of bytes i of x and j of y with i + j >= 3, summed in r17 (lost), r26, r27, r30, r31. */
+/* Products of bytes i of x and j of y with i + j >= 3, summed in r26 (lost), r27, r30, r31, r23: those of the same i + j
+ * together, so that a carry goes no further than one byte. Bytes of x that are done with make room. */
         .section .text.wide_fraction, "ax", @progbits
         .global wide_fraction
         .type wide_fraction, @function
-wide_fraction:                  /* r22-r25 x, r18-r21 y; returns r22-r25 */
-        push    r16
-        push    r17
-        clr     r16
-        clr     r17
-        mul     r24, r20
+wide_fraction:                  /* r22-r25 x, r18-r21 y (kept); returns r22-r25 */
+        mul     r22, r21
         movw    r26, r0
-        mul     r25, r21
-        movw    r30, r0
-        add_product r22, r21, r17, r26, r27, r30, r31
-        add_product r23, r20, r17, r26, r27, r30, r31
-        add_product r24, r19, r17, r26, r27, r30, r31
-        add_product r25, r18, r17, r26, r27, r30, r31
-        add_product r23, r21, r26, r27, r30, r31
-        add_product r25, r19, r26, r27, r30, r31
-        add_product r24, r21, r27, r30, r31
-        add_product r25, r20, r27, r30, r31
+        clr     r22             /* zero from here on */
+        clr     r30
+        clr     r31
+        add_product r22, r23, r20, r26, r27, r30
+        add_product r22, r24, r19, r26, r27, r30
+        add_product r22, r25, r18, r26, r27, r30
+        add_product r22, r23, r21, r27, r30, r31
+        add_product r22, r24, r20, r27, r30, r31
+        add_product r22, r25, r19, r27, r30, r31
+        clr     r23
+        add_product r22, r24, r21, r30, r31, r23
+        add_product r22, r25, r20, r30, r31, r23
+        add_product r22, r25, r21, r31, r23
         clr     r1
-        movw    r22, r26
-        movw    r24, r30
-        pop     r17
-        pop     r16
+        mov     r22, r27
+        mov     r25, r23
+        mov     r24, r31
+        mov     r23, r30
         ret

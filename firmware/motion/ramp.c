@@ -4,26 +4,21 @@
  * velocities at both ends is its duration, exactly.
  * By what part of its value the velocity changes in the group gives the shape of either. */
 #include "motion/ramp.h"
-#include "base/flash.h"
 #include "base/inline.h"
 #include "base/wide.h"
 #include "motion/block.h"
+#include "motion/group.h"
+#include "motion/group_layout.h"
 #include <string.h>
 
 #define GROUP_MAX_LOG2 9u
-#define RUN_MAX_PULSES 128u
 #define ODD_GROUP_LEAST 16u /* pulses of a group that are not a power of two */
 #define REST_PULSES 64u /* the least that is left for a fast ramp's last run */
 #define GROUP_MAX_TICKS 64000u /* below 65,536: intervals that grow are taken for longer than they are ... */
 #define GROUP_MAX_STEEP_TICKS 49152u /* ... by up to a third, in a steep ramp */
 /* Of velocity units squared, a pulse, for a hundredth of rad/s^2, times steps_per_rev: 360,000 / pi * 2^15. */
 #define LINEAR_SQUARE_Q15 3754936206u
-#define LINEAR_RATE_LOG2 48u
 #define LINEAR_STEEP_LOG2 (LINEAR_RATE_LOG2 + 2u - 28u) /* first intervals below 2^14 ticks: 4 K^2 / c below 2^28 */
-/* Runs: the interrupt's cycles for two segments, the planner's, and as much for others; and those of each pulse. */
-#define RUN_CYCLES 500u
-#define RUN_PULSE_CYCLES 24u
-#define RUN_SLOPE_Q16 127200u /* change of the interval within a run */
 
 void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev, uint32_t clock_hz)
 {
@@ -145,55 +140,6 @@ static NOINLINE uint16_t choose_group(ramp_t *ramp, uint16_t left)
     else
         left = (uint16_t)(left - odd);
     return left;
-}
-
-/* The mean of 1 / (1 + x) over n pulses, x from -p / 2 to p / 2 (not quite: at the pulses), is nearly 1 + second * p^2 /
- * (1 - fourth * p^2), in 1 / 2^16: all of it for n = 2 and 3, up to p^4 for others. For n = 2 to 8, and roughly for those
- * from 8, 16, 32 and 64 on. */
-typedef struct {
-    uint16_t second, fourth;
-} series_t;
-#define SERIES(n) \
-    {(uint16_t)(65536.0 / 12 * (1 - 1.0 / (n) / (n)) + 0.5), (uint16_t)(65536.0 * 3 / 20 * (1 - 7.0 / 3 / (n) / (n)) + 0.5)}
-static const series_t series_of[] FLASH = {SERIES(2.0), SERIES(3.0), SERIES(4.0),  SERIES(5.0),  SERIES(6.0),
-                                           SERIES(7.0), SERIES(8.0), SERIES(16.0), SERIES(32.0), SERIES(1e9)};
-
-static const series_t *series(uint16_t pulses)
-{
-    uint8_t place = 6;
-    if (pulses < 8)
-        place = (uint8_t)(pulses - 2);
-    for (; place < 9 && pulses >= 16; place++)
-        pulses >>= 1;
-    return &series_of[place];
-}
-
-/* The shape of a group of several intervals, from the one at the mean of the velocities of its ends: that, times the part
- * by which the velocity changes in the group, times it again ... */
-enum { MEAN, SLOPE, CURVE, THIRD, FOURTH, POWERS };
-
-/* mean[MEAN] becomes that of the intervals. */
-static void shape(const ramp_t *ramp, uint32_t *powers_q16, uint16_t pulses)
-{
-    uint32_t rate_q40 = ramp->rate;
-    if (ramp->linear)
-        rate_q40 = wide_fraction(powers_q16[MEAN], rate_q40) << (40 + 16 - LINEAR_RATE_LOG2 - 1);
-    uint32_t part = wide_fraction(powers_q16[MEAN] * pulses, rate_q40) << 8;
-    for (uint8_t i = MEAN; i < FOURTH; i++)
-        powers_q16[i + 1] = wide_fraction(powers_q16[i], part);
-    uint32_t curve = powers_q16[CURVE];
-    powers_q16[CURVE] += curve;
-    if (ramp->linear) {
-        powers_q16[CURVE] += curve;
-        return;
-    }
-    const series_t *factors = series(pulses);
-    uint32_t fourth = (uint32_t)flash_u16(&factors->fourth) << 16;
-    uint32_t term = wide_fraction(powers_q16[FOURTH], fourth);
-    curve += term;
-    if (ramp->steep > 1)
-        curve += wide_fraction(wide_fraction(wide_fraction(term, part), part), fourth);
-    powers_q16[MEAN] += wide_fraction(curve, (uint32_t)flash_u16(&factors->second) << 16);
 }
 
 /* -- the laws ----------------------------------------------------------------------------------------------------- */
@@ -365,112 +311,52 @@ static uint16_t linear_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16, w
 
 /* -- both -------------------------------------------------------------------------------------------------------- */
 
-/* Divides a group, given by its mean and the law's derivatives in its middle, into runs. */
-static void divide(ramp_t *ramp, uint16_t pulses, block_t *group, const uint32_t *powers_q16)
-{
-    uint8_t run = 1;
-    uint16_t runs = pulses;
-    while ((runs & 1) == 0 && run < RUN_MAX_PULSES) {
-        runs >>= 1;
-        run = (uint8_t)(run << 1);
-    }
-    uint32_t slope = powers_q16[SLOPE];
-    uint32_t curve = powers_q16[CURVE];
-    uint32_t third = powers_q16[THIRD];
-    if (runs > 1) {
-        uint32_t part = UINT32_MAX / runs; /* as good as 2^32 / runs */
-        slope = wide_fraction(slope, part);
-        curve = wide_fraction(wide_fraction(curve, part), part);
-        third = wide_fraction(third, part);
-    }
-    uint8_t odd = (uint8_t)runs;
-    /* How many pulses may share one or two timer values. */
-    uint16_t ticks = ramp->ticks;
-    uint8_t run_pulse_ticks = (uint8_t)(RUN_PULSE_CYCLES >> ramp->cycles_log2);
-    if (ticks > run_pulse_ticks) {
-        uint16_t span = (uint16_t)((ticks - run_pulse_ticks) * run);
-        uint16_t least = (uint16_t)((uint16_t)(2 * RUN_CYCLES * (uint8_t)(ramp->steep + 1)) >> ramp->cycles_log2);
-        uint32_t most = ticks < ramp->split_ticks ? RUN_SLOPE_Q16 / 4 : RUN_SLOPE_Q16;
-        while (run > ramp->least_run && slope > most && span >= least) {
-            run >>= 1;
-            odd = (uint8_t)(odd << 1);
-            span >>= 1;
-            slope >>= 1;
-            third >>= 1;
-            curve >>= 2;
-        }
-    }
-    ramp->run_pulses = run;
-    group->pulses = run;
-    group->runs = odd;
-    /* The cubic part: so that two and four runs are right, and of more all nearly. */
-    uint8_t cubic_q8 = odd == 2 ? 16 : odd == 4 ? 36 : 48;
-    slope += wide_fraction(third, (uint32_t)cubic_q8 << 24);
-    /* From the law's to the differences of the runs. */
-    uint8_t steps = (uint8_t)(odd - 1);
-    uint32_t bend = curve * (uint8_t)(odd - 2); /* (of no use where there is one run only) */
-    slope = ramp->faster ? 0u - slope : slope;
-    slope -= (uint32_t)((int32_t)bend >> 1);
-    group->slope_q16 = (int32_t)slope;
-    group->curve_q16 = (int32_t)curve;
-    group->top_q16 = powers_q16[MEAN] - 65536u - wide_fraction(bend * steps, 715827883u) - (uint32_t)((int32_t)(slope * steps) >> 1); /* 2^32 / 6 */
-}
-
-uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *group)
+uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *block)
 {
     uint16_t few = (uint16_t)left;
     if (left > 4u << GROUP_MAX_LOG2)
         few = 4u << GROUP_MAX_LOG2;
     uint16_t pulses;
-    wide_t sum_q16;
-    uint32_t powers_q16[POWERS];
-    bool fits;
-    do {
+    group_t group;
+    for (;;) {
         wide_t change;
         bool goes_on = ramp->linear && !ramp->bounded;
         if (goes_on) {
-            pulses = linear_next(ramp, few, &sum_q16, &change);
+            pulses = linear_next(ramp, few, &group.sum_q16, &change);
+            wide_copy(&group.end_q16, &group.sum_q16);
         } else if (!ramp->linear) {
-            pulses = harmonic_next(ramp, few, &sum_q16);
+            pulses = harmonic_next(ramp, few, &group.sum_q16);
         } else {
-            wide_copy(&sum_q16, &ramp->limit.bound_q16);
-            set_ticks(ramp, &sum_q16);
+            wide_copy(&group.sum_q16, &ramp->limit.bound_q16);
+            set_ticks(ramp, &group.sum_q16);
             pulses = choose_group(ramp, few);
         }
-        wide_t last_q16;
-        wide_copy(&last_q16, &sum_q16);
+        block->runs = 0;
+        if (ramp->bounded)
+            wide_multiply(&group.sum_q16, pulses);
+        else if (pulses > 1)
+            group_plan(ramp, &group, block, pulses);
+        if (!goes_on)
+            break;
+        wide_subtract(&group.end_q16, &ramp->limit.bound_q16);
+        if (wide_is_negative(&group.end_q16) != ramp->faster)
+            break;
+        /* Beyond the limit: fewer pulses. */
+        wide_change(&ramp->x, &change, !ramp->faster);
+        ramp->v = wide_root(&ramp->x);
         if (pulses > 1) {
-            powers_q16[MEAN] = wide_half(&sum_q16, 0);
-            if (!ramp->bounded) {
-                shape(ramp, powers_q16, pulses);
-                uint32_t half = powers_q16[SLOPE] >> 1;
-                wide_set(&last_q16, ramp->faster ? powers_q16[MEAN] - half : powers_q16[MEAN] + half);
-            }
-            wide_set(&sum_q16, powers_q16[MEAN] * pulses);
+            ramp->most_log2 = (uint8_t)(ramp->group_log2 - 1);
+        } else {
+            /* All that is left: equal intervals, from this one on. */
+            ramp->most_log2 = GROUP_MAX_LOG2;
+            ramp->bounded = true;
+            few = 1;
         }
-        fits = true;
-        if (goes_on) {
-            wide_subtract(&last_q16, &ramp->limit.bound_q16);
-            fits = wide_is_negative(&last_q16) != ramp->faster;
-            if (!fits) {
-                wide_change(&ramp->x, &change, !ramp->faster);
-                ramp->v = wide_root(&ramp->x);
-                if (pulses > 1) {
-                    ramp->most_log2 = (uint8_t)(ramp->group_log2 - 1);
-                } else {
-                    /* All that is left: equal intervals, from this one on. */
-                    ramp->most_log2 = GROUP_MAX_LOG2;
-                    ramp->bounded = true;
-                    few = 1;
-                }
-            }
-        }
-    } while (!fits);
-    group->runs = 0;
+    }
     if (ramp->bounded)
         ramp->rest = false;
-    else if (pulses > 1 && !ramp->rest && (ramp->ticks >= ramp->split_ticks || pulses >= 8))
-        divide(ramp, pulses, group, powers_q16);
-    set_time(sum, &sum_q16);
+    if (block->runs)
+        ramp->run_pulses = block->pulses;
+    set_time(sum, &group.sum_q16);
     return pulses;
 }

@@ -82,8 +82,8 @@ void ramp_begin(ramp_t *ramp, const ramp_constants_t *constants, uint32_t v_most
 void ramp_square(wide_t *x, uint32_t v);
 
 /* The next group of at most `left` pulses (>= 1): returns how many, up to 512, and the sum of their intervals; that of
- * several is below 65,536 ticks. How these follow each other: `block`, of which runs, pulses, top, slope and curve are set;
- * no runs: alike. */
+ * several is below 65,536 ticks. How these follow each other: `block`, of which runs, pulses, top, slope and curve are set,
+ * carry and width lost; no runs: alike. */
 uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *block);
 
 #endif

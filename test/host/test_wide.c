@@ -105,6 +105,20 @@ static void test_a_fraction_is_the_upper_half_of_the_product_or_up_to_four_less(
     TEST_ASSERT_EQUAL_UINT32(0x00123456u, wide_fraction(0x12345600u, 0x01000000u));
 }
 
+static void test_a_fraction_is_that_of_the_products_which_are_not_left_out(void)
+{
+    uint64_t state = 5;
+    for (uint16_t i = 0; i < 2000; i++) {
+        uint32_t x = (uint32_t)next_value(&state), y = (uint32_t)next_value(&state);
+        uint64_t product = (uint64_t)x * y;
+        for (uint8_t a = 0; a < 3; a++) {
+            for (uint8_t b = 0; a + b < 3; b++)
+                product -= (uint64_t)((x >> 8 * a & 0xFF) * (y >> 8 * b & 0xFF)) << 8 * (a + b);
+        }
+        TEST_ASSERT_EQUAL_HEX32((uint32_t)(product >> 32), wide_fraction(x, y));
+    }
+}
+
 static void test_shifts_go_both_ways_and_lose_what_leaves(void)
 {
     uint64_t state = 4;
@@ -138,6 +152,7 @@ int main(void)
     RUN_TEST(test_the_largest_product_has_all_its_carries);
     RUN_TEST(test_setting_clears_the_upper_half);
     RUN_TEST(test_a_fraction_is_the_upper_half_of_the_product_or_up_to_four_less);
+    RUN_TEST(test_a_fraction_is_that_of_the_products_which_are_not_left_out);
     RUN_TEST(test_shifts_go_both_ways_and_lose_what_leaves);
     RUN_TEST(test_32_bits_are_taken_from_any_of_the_lower_bytes);
     return UNITY_END();

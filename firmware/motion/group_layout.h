@@ -1,0 +1,36 @@
+/* What group.S and group.c share: where the members of ramp_t, block_t and group_t are (group.c checks each at compile
+ * time), and what limits a run. */
+#ifndef MOTION_GROUP_LAYOUT_H
+#define MOTION_GROUP_LAYOUT_H
+
+#include "motion/block_offsets.h"
+
+#define BLOCK_THIRD BLOCK_CARRY /* in the place of carry and width, which a block gets when it begins */
+
+#define GROUP_SUM 0
+#define GROUP_END 8
+
+#define RAMP_LINEAR 0
+#define RAMP_FASTER 1
+#define RAMP_RATE 18
+#define RAMP_CYCLES_LOG2 31
+#define RAMP_SPLIT_TICKS 32
+#define RAMP_LEAST_RUN 33
+#define RAMP_STEEP 50
+#define RAMP_REST 52
+#define RAMP_TICKS 56
+
+/* ramp_t.rate has 40 bits behind the point in a harmonic ramp. In a linear one it has so many; half of its product with
+ * an interval is shifted to 40. */
+#define LINEAR_RATE_LOG2 48
+#define LINEAR_RATE_SHIFT (40 + 16 - LINEAR_RATE_LOG2 - 1)
+
+#define RUN_MAX_PULSES 128
+/* Runs: the interrupt's cycles for two segments, the planner's, and as much for others; and those of each pulse. */
+#define RUN_CYCLES 500
+#define RUN_PULSE_CYCLES 24
+#define RUN_SLOPE_Q16 127200 /* change of the interval within a run */
+#define SIXTH_Q32 715827883 /* 2^32 / 6 */
+#define UNSPLIT_LEAST 8 /* pulses of a group whose runs are not split */
+
+#endif
