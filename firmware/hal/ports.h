@@ -3,7 +3,7 @@
 #define HAL_PORTS_H
 
 /* The receivers': what arrives at 250,000 Bd while the planner is at its longest piece of work (4 ms), and at 38,400. */
-#define USART_RX_BYTES 112
+#define USART_RX_BYTES 106
 #define SOFT_RX_BYTES 64 /* a power of two */
 #define PORT_TX_BYTES 32 /* a power of two: its index wraps by masking */
 
