@@ -25,6 +25,7 @@ import pathlib
 import re
 import subprocess
 import sys
+import tempfile
 
 REACH = 3900  # bytes of a short call or jump, less what the estimate may err
 SHORT, LONG = 2, 4  # bytes of a call or a jump
@@ -135,7 +136,6 @@ class Program:
         self.calls = {}  # line -> instruction in its place
         self.gone = set()  # lines
         self.behind = collections.defaultdict(list)  # function -> subroutines that follow it: their lines
-        self.saved = 0
 
     def estimate_addresses(self, order):
         """Puts the functions one behind the other, in the linker's order."""
@@ -260,10 +260,9 @@ class Program:
         while heap:
             claimed, _, texts = heapq.heappop(heap)
             saved, chosen, subroutine = self.best(texts)
-            if saved != -claimed: # places are gone since
+            if saved != -claimed:  # places are gone since
                 add(texts)
                 continue
-            self.saved += saved
             for kept in self.keep_once(texts, chosen, subroutine):
                 add(kept)
 
@@ -308,9 +307,10 @@ def main():
     if "\n__tmp_reg__ = " in text and "\t.section\t.gnu.lto_" not in text:  # the compiler's, and machine code at last
         program = Program(text.split("\n"), set(options.timed.split()), order_of(options.order))
         program.shrink()
-        path = path.with_name(path.name + ".outlined.s")
-        path.write_text(program.text(), encoding="utf-8")
-        arguments[-1] = str(path)
+        with tempfile.NamedTemporaryFile("w", suffix=".s", encoding="utf-8") as outlined:
+            outlined.write(program.text())
+            outlined.flush()
+            return subprocess.run([options.assembler, *arguments[:-1], outlined.name], check=False).returncode
     return subprocess.run([options.assembler, *arguments], check=False).returncode
 
 

@@ -293,6 +293,87 @@ class Image(ToolTest):
         self.assertGreaterEqual(int(text.split()[1]), 60)
 
 
+class Outline(ToolTest):
+    """tools/outline.py, with a program in the place of the assembler that prints what it is given."""
+
+    SHIFT = ["lsl r18", "rol r19", "rol r20", "rol r21"]
+
+    def function(self, name, *instructions):
+        """Returns a function as the compiler writes it."""
+        lines = [f"{i}" if i.endswith(":") else f"\t{i}" for i in instructions]
+        head = [f'\t.section\t.text.{name},"ax",@progbits', f"{name}:", "\tpush r28", "/* prologue: function */"]
+        return "\n".join(head + lines + [f"\t.size\t{name}, .-{name}", ""])
+
+    def outline(self, *functions, timed=""):
+        """Returns the instructions and labels of the outcome."""
+        self.write("order.ld", "".join(f"*(.text.{name} .text.{name}.*)\n" for name in "abcd"))
+        source = self.write("in.s", "\t.file\t\"x\"\n__tmp_reg__ = 0\n" + "\n".join(functions))
+        code, text = self.tool("outline.py", "--as", "cat", "--order", "order.ld", "--timed", timed, "--", str(source))
+        self.assertEqual(0, code, text)
+        kept = [line.split(";")[0].strip() for line in text.splitlines()]
+        return [line for line in kept if line and line[0] != "/" and (line[0] != "." or line.endswith(":")) and "=" not in line]
+
+    def expanded(self, lines):
+        """Puts back what is called, and what is jumped to; returns {function: instructions}."""
+        at = {line[:-1]: number for number, line in enumerate(lines) if line.endswith(":")}
+
+        def body(number, inside):
+            found = []
+            for line in lines[number:]:
+                word, _, name = line.partition(" ")
+                if line.endswith(":"):
+                    continue
+                if ".Loutlined" in name:
+                    found += body(at[name], word == "call")
+                else:
+                    found.append(line)
+                if line == "ret" or word == "jmp":
+                    return found[:-1] if inside else found
+            return found
+
+        return {name: body(number, False) for name, number in at.items() if not name.startswith(".L")}
+
+    def test_a_repeated_sequence_is_kept_once(self):
+        functions = [self.function(n, f"ldi r22,{n!r}", *self.SHIFT, f"mov r24,r{i}", "ret") for i, n in enumerate("abcd")]
+        lines = self.outline(*functions)
+        self.assertEqual(1, lines.count("lsl r18"))
+        self.assertEqual(4, len([line for line in lines if line.startswith("call ")]))
+        for i, name in enumerate("abcd"):
+            self.assertEqual(
+                ["push r28", f"ldi r22,{name!r}", *self.SHIFT, f"mov r24,r{i}", "ret"], self.expanded(lines)[name]
+            )
+
+    def test_a_common_end_is_kept_once_with_what_it_pops(self):
+        end = ["sts x,r24", "pop r28", "ret"]
+        lines = self.outline(self.function("a", "ldi r24,1", *end), self.function("b", "ldi r24,2", *end))
+        self.assertEqual(1, lines.count("pop r28"))
+        self.assertEqual({"a": ["push r28", "ldi r24,1", *end], "b": ["push r28", "ldi r24,2", *end]}, self.expanded(lines))
+
+    def untouched(self, *instructions, timed=""):
+        """Whether four functions with these instructions stay as they are."""
+        functions = [self.function(n, f"ldi r22,{i}", *instructions, f"mov r24,r{i}", "ret") for i, n in enumerate("abcd")]
+        return not any("outlined" in line for line in self.outline(*functions, timed=timed))
+
+    def test_what_may_not_be_moved_stays(self):
+        self.assertFalse(self.untouched(*self.SHIFT))
+        self.assertTrue(self.untouched("cli", *self.SHIFT, "out __SREG__,r18"))
+        self.assertTrue(self.untouched("push r2", "push r3", "push r4", "pop r4"))
+        self.assertTrue(self.untouched("in r28,__SP_L__", "out __SP_L__,r28", "in r28,__SP_L__", "out __SP_L__,r28"))
+        self.assertTrue(self.untouched("brne .L1", ".L1:", "breq .L2", ".L2:", "brcs .L3", ".L3:"))
+
+    def test_a_skipped_instruction_stays_behind_its_skip(self):
+        lines = self.outline(*(self.function(n, f"sbrc r2,{i}", *self.SHIFT, f"mov r24,r{i}", "ret") for i, n in enumerate("abcd")))
+        for i in range(4):
+            self.assertEqual("lsl r18", lines[lines.index(f"sbrc r2,{i}") + 1])
+        lines = self.outline(*(self.function(n, f"ldi r22,{i}", *self.SHIFT, "sbrc r2,0", f"mov r24,r{i}", "ret") for i, n in enumerate("abcd")))
+        for i in range(4):
+            self.assertEqual("sbrc r2,0", lines[lines.index(f"mov r24,r{i}") - 1])
+
+    def test_where_time_counts_only_long_sequences_are_called(self):
+        self.assertTrue(self.untouched(*self.SHIFT, timed="a b c d"))
+        self.assertFalse(self.untouched(*self.SHIFT, *self.SHIFT, timed="a b c d"))
+
+
 class Trace(ToolTest):
     """tools/trace.py"""
 
