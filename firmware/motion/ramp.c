@@ -320,12 +320,13 @@ uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *block
     group_t group;
     for (;;) {
         wide_t change;
-        bool goes_on = ramp->linear && !ramp->bounded;
-        if (goes_on) {
+        bool goes_on = false;
+        if (!ramp->linear) {
+            pulses = harmonic_next(ramp, few, &group.sum_q16);
+        } else if (!ramp->bounded) {
+            goes_on = true;
             pulses = linear_next(ramp, few, &group.sum_q16, &change);
             wide_copy(&group.end_q16, &group.sum_q16);
-        } else if (!ramp->linear) {
-            pulses = harmonic_next(ramp, few, &group.sum_q16);
         } else {
             wide_copy(&group.sum_q16, &ramp->limit.bound_q16);
             set_ticks(ramp, &group.sum_q16);
