@@ -218,7 +218,8 @@ TIMED := main terminal_poll terminal_port_get terminal_port_put line_take comman
     queue_poll take take_next choose offer start_next ramp_steps engine_poll engine_single_pulse play_on look_for_end \
     note_begun pulses_left pulses_in_gear pulses_of_phase add_pulses ops_poll \
     ramp_next set_interval cruise_next append append_run block_append push \
-    get begin_ring drop_emission direction_flags signed_pulses profile_interval engine_check set_silence
+    get begin_ring drop_emission direction_flags signed_pulses make_ready profile_interval engine_check \
+    execute_read fill set_silence
 $(OUTLINE): tools/outline.py $(BUILD)/firmware/flags
 	@mkdir -p $(@D)
 	@echo '#!/bin/sh' >$@
