@@ -217,9 +217,9 @@ OUTLINE := $(BUILD)/outline/as
 TIMED := main terminal_poll terminal_port_get terminal_port_put line_take commands_read_ahead commands_execute \
     queue_poll take take_next choose offer start_next ramp_steps engine_poll engine_single_pulse play_on look_for_end \
     note_begun pulses_left pulses_in_gear pulses_of_phase add_pulses ops_poll \
-    ramp_next set_interval cruise_next append append_run block_append push \
+    set_interval cruise_next append append_run block_append push \
     get begin_ring drop_emission direction_flags signed_pulses make_ready profile_interval engine_check \
-    execute_read fill set_silence
+    execute_read fill set_silence emit_phase emit choose_group
 $(OUTLINE): tools/outline.py $(BUILD)/firmware/flags
 	@mkdir -p $(@D)
 	@echo '#!/bin/sh' >$@
@@ -251,7 +251,7 @@ newer: ## the same sources with the newer avr-gcc (14.2): no warning, and what i
 ifeq ($(NEWER_AVR),)
 	@echo 'newer: skipped, avr-gcc 14 is not here; ./sac newer fetches it'
 else
-	@$(MAKE) -s --no-print-directory AVR=$(NEWER_AVR) BUILD=$(BUILD)/newer FLASH_BUDGET=32768 firmware
+	@$(MAKE) -s --no-print-directory AVR=$(NEWER_AVR) BUILD=$(BUILD)/newer FLASH_BUDGET=32768 TIMED= firmware
 	@echo "newer: $$($(NEWER_AVR)gcc -dumpversion) builds all sources without a warning"
 endif
 
