@@ -259,7 +259,7 @@ endif
 
 HOST_WARNINGS := -Wall -Wextra -Wconversion -Wshadow -Wstrict-prototypes -Werror
 HOST_CFLAGS := -std=gnu11 -g $(HOST_WARNINGS)
-HOST_HEADERS := $(wildcard firmware/*.h firmware/*/*.h firmware/*/*.def test/*/*.h test/*/*/*.h tools/*/*.h)
+HOST_HEADERS := $(wildcard firmware/*.h firmware/*/*.h firmware/*/*.def test/*.h test/*/*.h test/*/*/*.h tools/*/*.h)
 SANITIZE := -fsanitize=address,undefined -fno-sanitize-recover=all
 UNITY_FLAGS := -DUNITY_INCLUDE_DOUBLE -DUNITY_SUPPORT_64
 BOARD_OBJS := $(BOARD_SRCS:%.c=$(BUILD)/%.o)
@@ -292,7 +292,7 @@ sim: $(BUILD)/sacsim $(BUILD)/sac.elf ## type at a simulated Nano; SIM='--help' 
 
 $(BUILD)/bench: $(BENCH_SRCS) $(BOARD_LIB) $(HOST_HEADERS)
 	$(call say,LD  $@)
-	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O2 -Itest/board -Ifirmware $(BOARD_LDFLAGS) -o $@ $(filter %.c %.a,$^) $(BOARD_LIBS) -lm
+	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O2 -Itest -Itest/board -Ifirmware $(BOARD_LDFLAGS) -o $@ $(filter %.c %.a,$^) $(BOARD_LIBS) -lm
 
 .PHONY: bench
 bench: $(BUILD)/bench $(BUILD)/sac.elf ## measure the image on the board; writes docs/benchmark.md

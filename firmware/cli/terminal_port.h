@@ -12,7 +12,7 @@
 #define TERMINAL_PORT_DAMAGED 0xFFu
 
 int16_t terminal_port_get(void);     /* -1: nothing has arrived */
-uint8_t terminal_port_waiting(void); /* how many bytes have arrived and not been taken, 0..111 or 0..63 */
+uint8_t terminal_port_waiting(void); /* how many bytes have arrived and not been taken, 0..105 or 0..63 */
 
 /* What terminal_port_get() will return after so many others; only as long as none has been taken since boot. */
 uint8_t terminal_port_peek(uint8_t others);

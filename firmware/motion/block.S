@@ -1,5 +1,6 @@
 /* block_append() of block.h for the AVR. Cycles: about 300 a call, 55 a run of one segment, 95 a run of two.
  * The C version in block.c is what runs on the host. */
+#include "base/registers.h"
 #include "motion/block_offsets.h"
 #include "motion/segment.h"
 
@@ -44,12 +45,7 @@
         .global block_append
         .type block_append, @function
 block_append:
-        ldi     r26, 0                  /* no frame */
-        ldi     r27, 0
-        ldi     r30, pm_lo8(saved)
-        ldi     r31, pm_hi8(saved)
-        jmp     __prologue_saves__
-saved:
+        save_registers
         movw    r28, r24
         load4   TOP0, TOP1, TOP2, TOP3, BLOCK_TOP
         load4   SLOPE0, SLOPE1, SLOPE2, SLOPE3, BLOCK_SLOPE
@@ -168,8 +164,5 @@ out:
         store4  CURVE0, CURVE1, CURVE2, CURVE3, BLOCK_CURVE
         std     Y + BLOCK_CARRY, CARRY0
         std     Y + BLOCK_CARRY + 1, CARRY1
-        in      r28, 0x3D
-        in      r29, 0x3E
-        ldi     r30, 18
-        jmp     __epilogue_restores__
+        restore_registers
         .size block_append, . - block_append

@@ -1,5 +1,6 @@
 /* group_plan() of group.h for the AVR. Cycles: 1,500 in a linear ramp, 1,850 in a harmonic one; 900 more where the number
  * of pulses is no power of two. The C version in group.c, where the reasons are, is what runs on the host. */
+#include "base/registers.h"
 #include "motion/group_layout.h"
 
 /* r2, r3: the ramp; Y: a number of the block. A number is worked on in r22-r25; products take the other factor, which they
@@ -9,12 +10,7 @@
         .global group_plan
         .type group_plan, @function
 group_plan:                     /* r24 ramp, r22 group, r20 block, r18 pulses */
-        ldi     r26, 0          /* no frame */
-        ldi     r27, 0
-        ldi     r30, pm_lo8(saved)
-        ldi     r31, pm_hi8(saved)
-        jmp     __prologue_saves__
-saved:
+        save_registers
         push    r22
         push    r23
         movw    r2, r24
@@ -328,10 +324,7 @@ saved:
         rcall   store
 
 leave:
-        in      r28, 0x3D
-        in      r29, 0x3E
-        ldi     r30, 18
-        jmp     __epilogue_restores__
+        restore_registers
 
 scale:                          /* the number in memory; Y goes on to the next */
         rcall   load

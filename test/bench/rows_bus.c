@@ -1,6 +1,7 @@
 /* Rows: packets while the motor runs; several units at one sync edge. */
 #include "bench.h"
 #include "bus.h"
+#include "crc8.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -18,20 +19,10 @@ static void run_bus(bus_t *bus, uint64_t cycles)
         die("the image crashed: %s", board_crash(bus_crashed(bus)));
 }
 
-static uint8_t sum(const uint8_t *bytes, size_t count)
-{
-    uint8_t crc = 0;
-    for (size_t bit = 0; bit < 8 * count; bit++) {
-        const unsigned feedback = (crc ^ (unsigned)bytes[bit / 8] >> bit % 8) & 1u;
-        crc = (uint8_t)(crc >> 1 ^ (feedback ? 0x8C : 0));
-    }
-    return crc;
-}
-
 /* As the manual has it, k CRC 1; three characters of silence follow. */
 static void send(bus_t *bus, bus_peer_t *master, uint8_t destination, const char *body)
 {
-    const uint8_t crc = sum((const uint8_t *)body, strlen(body));
+    const uint8_t crc = crc8((const uint8_t *)body, strlen(body));
     bus_peer_send(master, (const uint8_t[]){STX, destination, MASTER}, 3);
     bus_peer_send(master, body, strlen(body));
     bus_peer_send(master, (const uint8_t[]){ETX, crc, 0}, 3);

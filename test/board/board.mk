@@ -6,7 +6,7 @@ BOARD_SRCS += $(addprefix test/board/, board.c bus.c events.c extint.c image.c i
     simavr_glue.c timer.c timer16.c timer8.c timers.c)
 BOARD_TESTS += test_board_core test_board_timers test_board_bus
 BOARD_PROGRAMS += bus_node remote irq_order masked crash segments
-BOARD_CFLAGS += -Itest/board
+BOARD_CFLAGS += -Itest -Itest/board
 # simavr's static library; whatever the board defines itself stays out of the link (simavr_glue.c).
 BOARD_LIBS += -l:libsimavr.a -lelf -lm -lpthread
 

@@ -1,6 +1,7 @@
 /* The line: what the drivers do is put in order after each quantum, then told to all that hear it. */
 #include "board_internal.h"
 #include "bus.h"
+#include "splitmix64.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -225,13 +226,10 @@ static void line_becomes(bus_t *bus, int level, uint64_t cycle)
     }
 }
 
-/* splitmix64 in outline: a counter, mixed. Uniform in [0, 1). */
+/* Uniform in [0, 1). */
 static double random_fraction(bus_t *bus)
 {
-    uint64_t x = bus->random += 0x9E3779B97F4A7C15u;
-    x = (x ^ x >> 30) * 0xBF58476D1CE4E5B9u;
-    x = (x ^ x >> 27) * 0x94D049BB133111EBu;
-    return (double)((x ^ x >> 31) >> 11) / 9007199254740992.0;
+    return (double)(splitmix64(&bus->random) >> 11) / 9007199254740992.0;
 }
 
 static void next_error_slot(bus_t *bus)

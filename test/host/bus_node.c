@@ -1,18 +1,6 @@
 #include "host/bus_node.h"
-#include "cli/commands.h"
-#include "cli/network.h"
-#include "cli/terminal.h"
-#include "cli/trial.h"
-#include "eeprom/store.h"
-#include "host/fakes/bus_port_fake.h"
-#include "host/fakes/eeprom_port_fake.h"
-#include "host/fakes/engine_fake.h"
-#include "host/fakes/terminal_port_fake.h"
-#include "host/fakes/timebase_port_fake.h"
-#include "net/bus.h"
+#include "host/network_start.h"
 #include "queue/ops.h"
-#include "queue/queue.h"
-#include "settings.h"
 
 _Static_assert(BUS_NODE_CHARACTER_US == BUS_PORT_FAKE_CHARACTER_US, "the same line");
 
@@ -42,19 +30,7 @@ static void run_to(uint32_t us)
 
 static void start(uint8_t address)
 {
-    terminal_port_fake_reset();
-    engine_fake_reset();
-    eeprom_fake_reset();
-    trial_begin(store_load_settings());
-    settings.device_id = address;
-    settings.crc_mode = 2;
-    timebase_fake_step_us = 0;
-    bus_port_fake_reset();
-    commands_init();
-    queue_init();
-    terminal_init(STATUS_OK);
-    network_init();
-    bus_clear();
+    network_start(address, 2);
 }
 
 static void hear(const void *bytes, size_t count)

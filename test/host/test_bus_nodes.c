@@ -17,6 +17,8 @@
 #include <string.h>
 #include <sys/mman.h>
 #include <unistd.h>
+#include "crc8.h"
+#include "splitmix64.h"
 #include "unity.h"
 
 enum { NODES = 200, FIRST = 10, MASTERS = 4, MOST_BYTES = 80, ATTEMPTS = 20, BROADCASTS = 3 };
@@ -50,11 +52,7 @@ static uint64_t random_state;
 
 static uint32_t random_u32(void)
 {
-    random_state += 0x9E3779B97F4A7C15u; /* splitmix64 */
-    uint64_t z = random_state;
-    z = (z ^ z >> 30) * 0xBF58476D1CE4E5B9u;
-    z = (z ^ z >> 27) * 0x94D049BB133111EBu;
-    return (uint32_t)(z >> 32);
+    return (uint32_t)(splitmix64(&random_state) >> 32);
 }
 
 static uint32_t below(uint32_t limit)
@@ -122,23 +120,13 @@ typedef struct {
     size_t count;
 } frame_t;
 
-static uint8_t sum(const uint8_t *bytes, size_t count)
-{
-    uint8_t crc = 0;
-    for (size_t bit = 0; bit < 8 * count; bit++) {
-        const unsigned feedback = (crc ^ (unsigned)bytes[bit / 8] >> bit % 8) & 1u;
-        crc = (uint8_t)(crc >> 1 ^ (feedback ? 0x8C : 0));
-    }
-    return crc;
-}
-
 static frame_t make_frame(uint8_t destination, uint8_t origin, uint8_t sequence, const char *text)
 {
     frame_t frame = {.bytes = {STX, destination, origin, sequence}, .count = 4};
     for (; *text != '\0'; text++) {
         frame.bytes[frame.count++] = (uint8_t)*text;
     }
-    const uint8_t crc = sum(frame.bytes + 1, frame.count - 1);
+    const uint8_t crc = crc8(frame.bytes + 1, frame.count - 1);
     frame.bytes[frame.count++] = ETX;
     frame.bytes[frame.count++] = crc;
     frame.bytes[frame.count++] = '\0';
@@ -223,7 +211,7 @@ static uint8_t read_answer(const frame_t *frame, uint8_t destination, uint8_t or
     const uint8_t *bytes = frame->bytes;
     const size_t count = frame->count;
     if (count < 8 || bytes[0] != STX || bytes[count - 3] != ETX || bytes[count - 1] != '\0' ||
-        bytes[count - 2] != sum(bytes + 1, count - 4)) {
+        bytes[count - 2] != crc8(bytes + 1, count - 4)) {
         return 0;
     }
     if (bytes[1] != destination || bytes[2] != origin || bytes[3] != sequence) {

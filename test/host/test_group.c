@@ -67,7 +67,7 @@ static uint16_t choose_pulses(void)
     return pulses < 2 ? 2 : pulses;
 }
 
-static void compare(uint16_t pulses)
+static void assert_same_as_in_c(uint16_t pulses)
 {
     ramp_t ramp_before = ramp;
     group_t expected = group;
@@ -90,30 +90,33 @@ static void test_any_group_is_the_same_in_c_to_the_bit(void)
 {
     for (uint16_t i = 0; i < 5000; i++) {
         choose_ramp();
-        compare(choose_pulses());
+        assert_same_as_in_c(choose_pulses());
     }
+}
+
+static uint16_t choose_short_group(void)
+{
+    choose_ramp();
+    const uint16_t pulses = choose_pulses();
+    group.sum_q16 = (uint32_t)group.sum_q16 / pulses | 0x10000;
+    ramp.ticks = (uint16_t)((uint32_t)group.sum_q16 >> 16);
+    return pulses;
 }
 
 static void test_groups_of_less_than_65536_ticks_are_the_same_in_c_to_the_bit(void)
 {
     for (uint16_t i = 0; i < 5000; i++) {
-        choose_ramp();
-        uint16_t pulses = choose_pulses();
-        group.sum_q16 = (uint32_t)group.sum_q16 / pulses | 0x10000;
-        ramp.ticks = (uint16_t)((uint32_t)group.sum_q16 >> 16);
-        compare(pulses);
+        const uint16_t pulses = choose_short_group();
+        assert_same_as_in_c(pulses);
     }
 }
 
 static void test_groups_in_which_the_velocity_changes_by_little_are_the_same_in_c_to_the_bit(void)
 {
     for (uint16_t i = 0; i < 5000; i++) {
-        choose_ramp();
-        uint16_t pulses = choose_pulses();
-        group.sum_q16 = (uint32_t)group.sum_q16 / pulses | 0x10000;
-        ramp.ticks = (uint16_t)((uint32_t)group.sum_q16 >> 16);
+        const uint16_t pulses = choose_short_group();
         ramp.rate = (uint32_t)((RATE_Q40 * 64 * 500 + (next_bits() >> 8 & 0xFFFFFF)) / pulses / ramp.ticks);
-        compare(pulses);
+        assert_same_as_in_c(pulses);
     }
 }
 

@@ -1,23 +1,12 @@
 /* The network from the bytes of one line to those of the other: cli/network, net/bus, commands_execute_remote(), and what the
  * terminal shows of them. This node is 85 unless a test says otherwise. Where a packet is built, its CRC comes from a sum of
  * the test's own. */
-#include "cli/network.h"
+#include "host/network_start.h"
 #include <stdio.h>
 #include <string.h>
-#include "cli/commands.h"
-#include "cli/terminal.h"
-#include "cli/trial.h"
-#include "eeprom/store.h"
-#include "host/fakes/bus_port_fake.h"
-#include "host/fakes/eeprom_port_fake.h"
-#include "host/fakes/engine_fake.h"
-#include "host/fakes/terminal_port_fake.h"
-#include "host/fakes/timebase_port_fake.h"
-#include "net/bus.h"
 #include "queue/ops.h"
-#include "queue/queue.h"
 #include "queue/session.h"
-#include "settings.h"
+#include "crc8.h"
 #include "unity.h"
 
 enum { OWN = 85, OTHER = 10, ANSWER_MS = 90 };
@@ -44,21 +33,9 @@ static void run_ms(unsigned ms)
 
 static void begin(uint8_t own, uint8_t crc_mode)
 {
-    terminal_port_fake_reset();
-    engine_fake_reset();
-    engine_fake.played = ops_played;
-    eeprom_fake_reset();
-    trial_begin(store_load_settings());
-    settings.device_id = own;
-    settings.crc_mode = crc_mode;
     timebase_fake_us += 1000000;
-    timebase_fake_step_us = 0;
-    bus_port_fake_reset();
-    commands_init();
-    queue_init();
-    terminal_init(STATUS_OK);
-    network_init();
-    bus_clear();
+    network_start(own, crc_mode);
+    engine_fake.played = ops_played;
     run_ms(5);
     terminal_port_fake_clear();
 }
@@ -73,16 +50,6 @@ void tearDown(void)
     TEST_ASSERT_EQUAL_UINT(0, bus_port_fake.clashes); /* NET-008 */
 }
 
-static uint8_t sum(const uint8_t *bytes, size_t count)
-{
-    uint8_t crc = 0;
-    for (size_t bit = 0; bit < 8 * count; bit++) {
-        const unsigned feedback = (crc ^ (unsigned)bytes[bit / 8] >> bit % 8) & 1u;
-        crc = (uint8_t)(crc >> 1 ^ (feedback ? 0x8C : 0));
-    }
-    return crc;
-}
-
 typedef struct {
     uint8_t bytes[80];
     size_t count;
@@ -94,7 +61,7 @@ static frame_t frame(uint8_t destination, uint8_t origin, const char *body)
     frame_t made = {.bytes = {2, destination, origin}, .count = length + 6};
     memcpy(made.bytes + 3, body, length);
     made.bytes[3 + length] = 3;
-    made.bytes[4 + length] = settings.crc_mode == 2 ? sum(made.bytes + 1, length + 2) : sum(made.bytes + 3, length);
+    made.bytes[4 + length] = settings.crc_mode == 2 ? crc8(made.bytes + 1, length + 2) : crc8(made.bytes + 3, length);
     return made;
 }
 

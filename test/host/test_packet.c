@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "splitmix64.h"
 #include "unity.h"
 
 enum { OWN = 85, OTHER = 10, MOST_BYTES = PACKET_BODY_BYTES + 6 };
@@ -320,11 +321,7 @@ static uint64_t state;
 
 static uint32_t random_u32(void)
 {
-    state += 0x9E3779B97F4A7C15u; /* splitmix64 */
-    uint64_t z = state;
-    z = (z ^ z >> 30) * 0xBF58476D1CE4E5B9u;
-    z = (z ^ z >> 27) * 0x94D049BB133111EBu;
-    return (uint32_t)(z >> 32);
+    return (uint32_t)(splitmix64(&state) >> 32);
 }
 
 static uint32_t below(uint32_t limit)

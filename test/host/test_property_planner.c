@@ -10,6 +10,7 @@
 #include "motion/engine.h"
 #include "motion/profile.h"
 #include "settings.h"
+#include "splitmix64.h"
 #include "unity.h"
 
 #define PLANNED_COMMANDS 20000u
@@ -34,17 +35,9 @@ void tearDown(void)
 
 static uint64_t random_state;
 
-static uint64_t random_bits(void) /* splitmix64 */
-{
-    uint64_t z = random_state += 0x9E3779B97F4A7C15u;
-    z = (z ^ z >> 30) * 0xBF58476D1CE4E5B9u;
-    z = (z ^ z >> 27) * 0x94D049BB133111EBu;
-    return z ^ z >> 31;
-}
-
 static uint32_t random_below(uint32_t limit)
 {
-    return (uint32_t)(random_bits() % limit);
+    return (uint32_t)(splitmix64(&random_state) % limit);
 }
 
 static bool random_chance(uint32_t percent)
@@ -55,7 +48,7 @@ static bool random_chance(uint32_t percent)
 /* As often between 1 and 10 as between 10,000 and 100,000. */
 static uint32_t random_log(uint32_t least, uint32_t most)
 {
-    double x = (double)(random_bits() >> 11) / 9007199254740992.0;
+    double x = (double)(splitmix64(&random_state) >> 11) / 9007199254740992.0;
     double value = exp(log(least) + x * (log((double)most + 1.0) - log(least)));
     return value < least ? least : value > most ? most : (uint32_t)value;
 }

@@ -1,5 +1,6 @@
 #include "master.h"
 #include "image.h"
+#include "crc8.h"
 #include "soft_peer.h"
 
 #include <inttypes.h>
@@ -20,25 +21,15 @@ static uint64_t sent_from, sent_at; /* first start bit and last stop bit of what
 
 /* -- frames -------------------------------------------------------------------------------------------------------- */
 
-static uint8_t sum(const uint8_t *bytes, size_t count)
-{
-    unsigned crc = 0;
-    for (size_t bit = 0; bit < 8 * count; bit++) {
-        const unsigned feedback = (crc ^ (unsigned)bytes[bit / 8] >> bit % 8) & 1u;
-        crc = crc >> 1 ^ (feedback ? 0x8Cu : 0);
-    }
-    return (uint8_t)crc;
-}
-
 frame_t master_frame(uint8_t destination, uint8_t origin, const char *body)
 {
     const size_t length = strlen(body);
     frame_t frame = {.byte = {2, destination, origin}, .count = 3 + length};
     memcpy(frame.byte + 3, body, length);
-    uint8_t crc = crc_mode == 2 ? sum(frame.byte + 1, length + 2) : sum(frame.byte + 3, length);
+    uint8_t crc = crc_mode == 2 ? crc8(frame.byte + 1, length + 2) : crc8(frame.byte + 3, length);
     if (crc_mode == 1 && crc == 0) { /* would read as none */
         frame.byte[frame.count++] = ' ';
-        crc = sum(frame.byte + 3, length + 1);
+        crc = crc8(frame.byte + 3, length + 1);
     }
     frame.byte[frame.count++] = 3;
     if (crc_mode != 0)

@@ -1,4 +1,5 @@
 #include "nodes.h"
+#include "crc8.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -126,16 +127,6 @@ void master_begin(void)
     jammer = bus_peer(bus, BAUD);
 }
 
-static uint8_t sum(const uint8_t *bytes, size_t count)
-{
-    uint8_t crc = 0;
-    for (size_t bit = 0; bit < 8 * count; bit++) {
-        const unsigned feedback = (crc ^ (unsigned)bytes[bit / 8] >> bit % 8) & 1u;
-        crc = (uint8_t)(crc >> 1 ^ (feedback ? 0x8C : 0));
-    }
-    return crc;
-}
-
 size_t master_packet(uint8_t *bytes, uint8_t destination, uint8_t sequence, const char *text)
 {
     size_t count = 0;
@@ -145,7 +136,7 @@ size_t master_packet(uint8_t *bytes, uint8_t destination, uint8_t sequence, cons
     bytes[count++] = sequence;
     while (*text != '\0')
         bytes[count++] = (uint8_t)*text++;
-    const uint8_t crc = sum(bytes + 1, count - 1);
+    const uint8_t crc = crc8(bytes + 1, count - 1);
     bytes[count++] = ETX;
     bytes[count++] = crc;
     bytes[count++] = '\0';
@@ -186,7 +177,7 @@ uint8_t master_sends(uint8_t destination, uint8_t sequence, const char *text)
         count = answered(bytes);
     } while (count != before);
     const bool right = count >= 8 && bytes[0] == STX && bytes[1] == MASTER && bytes[2] == destination && bytes[3] == sequence &&
-                       bytes[count - 3] == ETX && bytes[count - 2] == sum(bytes + 1, count - 4) && bytes[count - 1] == '\0';
+                       bytes[count - 3] == ETX && bytes[count - 2] == crc8(bytes + 1, count - 4) && bytes[count - 1] == '\0';
     if (!right)
         nodes_run(ANSWER); /* whatever was on the line is over */
     return right ? bytes[4] : 0;

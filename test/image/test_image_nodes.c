@@ -2,6 +2,7 @@
  * SAC_NODE_COMMANDS: how many commands go over the bad line; SAC_NODE_LOSS: of how many one is lost, each way;
  * SAC_NODE_SEED (make test-nodes-long: 10^4). */
 #include "nodes.h"
+#include "splitmix64.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -32,11 +33,7 @@ static uint64_t state;
 
 static uint32_t below(uint32_t limit)
 {
-    state += 0x9E3779B97F4A7C15u; /* splitmix64 */
-    uint64_t z = state;
-    z = (z ^ z >> 30) * 0xBF58476D1CE4E5B9u;
-    z = (z ^ z >> 27) * 0x94D049BB133111EBu;
-    return (uint32_t)((z >> 32) * limit >> 32);
+    return (uint32_t)((splitmix64(&state) >> 32) * limit >> 32);
 }
 
 static void assert_pulses(unsigned which, size_t expected)

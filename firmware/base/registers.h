@@ -1,0 +1,25 @@
+/* Macros of the assembler: all that a function must not change, saved and given back by the two pieces of code that
+ * -mcall-prologues has in the image anyway.
+ *
+ * save_registers: r2 to r17, r28 and r29 on the stack, no frame; Z is lost, X is 0. restore_registers: and back to the
+ * caller; nothing else may be on the stack. Errors: none. Source: avr-gcc, libgcc's __prologue_saves__. */
+#ifndef BASE_REGISTERS_H
+#define BASE_REGISTERS_H
+
+.macro save_registers
+        ldi     r26, 0
+        ldi     r27, 0
+        ldi     r30, pm_lo8(1f)
+        ldi     r31, pm_hi8(1f)
+        jmp     __prologue_saves__
+1:
+.endm
+
+.macro restore_registers
+        in      r28, 0x3D
+        in      r29, 0x3E
+        ldi     r30, 18
+        jmp     __epilogue_restores__
+.endm
+
+#endif
