@@ -52,7 +52,6 @@ void network_init(void)
     AT_BOOT_ZERO(asked);
     AT_BOOT_ZERO(shown);
     AT_BOOT_ZERO(sequence);
-    AT_BOOT_ZERO(greeted);
     greeted = settings.device_id; /* nobody yet */
     bus_init();
 }
