@@ -9,7 +9,7 @@
  * NETWORK_ANSWER_128US and NETWORK_ANSWER_CHARACTERS. The answer is shown as `K` or `NAK`, a message as `10:85> text`.
  * Context: main loop.
  * Errors:  STATUS_NO_ANSWER, STATUS_NOBODY, and those of the command.
- * Tests:   test/host/test_network.c
+ * Tests:   test/host/test_network.c; test_image_network.c, test_image_line.c and test_image_nodes.c in test/image
  * Source:  manual lines 171-215, 797-799, 823-835; decisions 0.4 and section 8. */
 #ifndef CLI_NETWORK_H
 #define CLI_NETWORK_H
