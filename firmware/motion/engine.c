@@ -393,15 +393,15 @@ static NOINLINE void allow_hold(uint8_t pulses)
 /* Before segments are appended: takes account of what has been played. True if held pulses were among it. Until they are
  * appended no more pulses may be repeated than before: what a joined command's first pulse ends is a tail, not one of its
  * intervals. */
-static NOINLINE bool settle(uint8_t hold)
+static NOINLINE uint8_t settle(uint8_t hold)
 {
     look_for_end();
     if (hold < step_hold + step_held)
         allow_hold(hold); /* first, so that what is held from here on can be given back */
-    if (step_held == 0)
-        return false;
-    absorb_held();
-    return true;
+    uint8_t held = step_held;
+    if (held != 0)
+        absorb_held();
+    return held;
 }
 
 /* Appends a segment as it is: no early reload, pulses not accounted for. */
@@ -1253,8 +1253,8 @@ static NOINLINE bool play_on(void)
     }
     if (engine.next && engine.playing && !engine.single && engine.stage > STAGE_TAIL)
         join_next();
-    /* Until the ring is half full nothing else is as urgent, within reason; then a step at a time. (A timer that has run out
-     * of segments is started again as soon as there is one.) */
+    /* Until the ring is three quarters full nothing else is as urgent, within reason; then a step at a time. (A timer that
+     * has run out of segments is started again as soon as there is one.) */
     uint8_t rounds = 6;
     if (engine.playing) {
         do {
@@ -1262,7 +1262,7 @@ static NOINLINE bool play_on(void)
             if (ring_free() < least || !emit())
                 break;
             worked = true;
-        } while (ring_free() > SEGMENT_COUNT / 2 * SEGMENT_BYTES && !step_idle && --rounds);
+        } while (ring_free() > SEGMENT_COUNT / 4 * SEGMENT_BYTES && !step_idle && --rounds);
     }
     return worked;
 }
