@@ -240,7 +240,7 @@ static void receive(void)
     owed = everybody ? 0 : session.options & SESSION_ACK;
 }
 
-NOINLINE uint8_t network_poll(void)
+static NOINLINE uint8_t attend(void)
 {
     if (shown >= bus_packet.body && shown <= bus_packet.body + PACKET_BODY_BYTES) {
         return 0; /* the packet is still needed */
@@ -275,7 +275,15 @@ NOINLINE uint8_t network_poll(void)
             asked = FAILED; /* the line that waits for it tells */
         }
     }
-    return (uint8_t)(owed | bus_sending());
+    const uint8_t at_work = (uint8_t)(owed | bus_sending());
+    bus_awake = (uint8_t)(at_work | asked | commands_restart_due() | bus_expects());
+    return at_work;
+}
+
+NOINLINE uint8_t network_poll(void)
+{
+    /* In standstill a line's end at the terminal must not wait for all that is not to be done here. */
+    return bus_awake || bus_port_waiting() ? attend() : 0;
 }
 
 /* -- showing ---------------------------------------------------------------------------------------------------------- */

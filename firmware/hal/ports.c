@@ -113,9 +113,9 @@ ALWAYS_INLINE int16_t take(port_t *port, uint8_t places)
     return byte;
 }
 
-static int16_t get(uint8_t hardware)
+static int16_t get(uint8_t software)
 {
-    return hardware ? take(&usart_port, USART_RX_BYTES) : take(&soft_uart.port, SOFT_RX_BYTES);
+    return software ? take(&soft_uart.port, SOFT_RX_BYTES) : take(&usart_port, USART_RX_BYTES);
 }
 
 ALWAYS_INLINE uint8_t free_places_of(const port_t *port)
@@ -123,9 +123,9 @@ ALWAYS_INLINE uint8_t free_places_of(const port_t *port)
     return (uint8_t)((port->tx_tail - port->tx_head - 1) & (PORT_TX_BYTES - 1));
 }
 
-static uint8_t free_places(uint8_t hardware)
+static uint8_t free_places(uint8_t software)
 {
-    return hardware ? free_places_of(&usart_port) : free_places_of(&soft_uart.port);
+    return software ? free_places_of(&soft_uart.port) : free_places_of(&usart_port);
 }
 
 ALWAYS_INLINE uint8_t waiting(const port_t *port, uint8_t places)
@@ -147,9 +147,9 @@ static bool soft_sends(void)
     return (TIMSK0 & _BV(OCIE0A)) != 0;
 }
 
-static void put(uint8_t hardware, uint8_t byte)
+static void put(uint8_t software, uint8_t byte)
 {
-    if (hardware) {
+    if (!software) {
         UCSR0A = (uint8_t)((UCSR0A & _BV(U2X0)) | _BV(TXC0)); /* cleared, until this one is out (20.11.2) */
         append(&usart_port, byte);
         UCSR0B = usart_control | _BV(UDRIE0);
@@ -172,7 +172,7 @@ static void put(uint8_t hardware, uint8_t byte)
 
 int16_t terminal_port_get(void)
 {
-    return get(!network);
+    return get(network);
 }
 
 uint8_t terminal_port_waiting(void)
@@ -182,7 +182,7 @@ uint8_t terminal_port_waiting(void)
 
 uint8_t terminal_port_free(void)
 {
-    return free_places(!network);
+    return free_places(network);
 }
 
 uint8_t terminal_port_peek(uint8_t others)
@@ -200,7 +200,7 @@ bool terminal_port_idle(void)
 
 void terminal_port_put(uint8_t byte)
 {
-    put(!network, byte);
+    put(network, byte);
 }
 
 void ops_port_send(uint8_t byte)
@@ -212,9 +212,14 @@ void ops_port_send(uint8_t byte)
 
 /* -- the network's ------------------------------------------------------------------------------------------------- */
 
+uint8_t bus_port_waiting(void)
+{
+    return network ? usart_port.rx_head ^ usart_port.rx_tail : soft_uart.port.rx_head ^ soft_uart.port.rx_tail;
+}
+
 int16_t bus_port_get(void)
 {
-    return get(network);
+    return get(network ^ 1);
 }
 
 void bus_port_begin(void)
@@ -233,12 +238,12 @@ uint8_t bus_port_free(void)
     if (network && (uint16_t)(timebase_128us() - begun_128us) <= bus_port_characters_128us(1) / 8 + 1) {
         return 0;
     }
-    return free_places(network);
+    return free_places(network ^ 1);
 }
 
 void bus_port_put(uint8_t byte)
 {
-    put(network, byte);
+    put(network ^ 1, byte);
 }
 
 void bus_port_end(void)

@@ -7,6 +7,7 @@
 
 bus_counters_t bus_counters;
 packet_t bus_packet;
+uint8_t bus_awake;
 
 static enum { LISTENING, PUTTING, LEAVING } phase; /* LEAVING: all is put, the last bits go out */
 static uint8_t put, count; /* bytes of the packet that is sent */
@@ -15,9 +16,9 @@ static uint16_t since_128us; /* something was heard or sent */
 static uint8_t ops_waiting;
 static uint8_t ops; /* 1: DC2; the oldest in the highest bit of those waiting */
 
-NOINLINE bool bus_strict(void)
+NOINLINE uint8_t bus_strict(void)
 {
-    return settings.crc_mode == 2;
+    return settings.crc_mode & 2;
 }
 
 void bus_init(void)
@@ -25,6 +26,7 @@ void bus_init(void)
     AT_BOOT_ZERO(bus_counters);
     AT_BOOT_ZERO(bus_packet);
     AT_BOOT_ZERO(phase);
+    AT_BOOT_ZERO(bus_awake);
     AT_BOOT_ZERO(ops_waiting);
 }
 
@@ -82,23 +84,29 @@ NOINLINE packet_event_t bus_poll(void)
     return event;
 }
 
-bool bus_sending(void)
+uint8_t bus_expects(void)
 {
-    return phase != LISTENING;
+    return (uint8_t)(packet_under_way(&bus_packet) | ops_waiting);
 }
 
-NOINLINE bool bus_free(uint8_t characters)
+uint8_t bus_sending(void)
+{
+    return phase;
+}
+
+NOINLINE uint8_t bus_free(uint8_t characters)
 {
     return phase == LISTENING && !packet_under_way(&bus_packet) && silent_for(characters);
 }
 
-NOINLINE void bus_send(uint8_t destination, bool crc)
+NOINLINE void bus_send(uint8_t destination, uint8_t crc)
 {
     bus_packet.destination = destination;
     bus_packet.origin = settings.device_id;
     count = packet_close(&bus_packet, crc, bus_strict());
     put = 0;
     phase = PUTTING;
+    bus_awake = 1;
     bus_port_begin();
 }
 
@@ -111,18 +119,19 @@ void bus_clear(void)
 void bus_ops(uint8_t byte)
 {
     if (ops_waiting < 8) {
+        bus_awake = 1;
         ops_waiting++;
-        ops = (uint8_t)(ops << 1 | (byte == PACKET_DC2));
+        ops = (uint8_t)(ops << 1 | (byte >> 1 & 1)); /* DC2 has this bit */
     }
 }
 
-bool bus_ops_wait(void)
+uint8_t bus_ops_wait(void)
 {
-    return ops_waiting != 0;
+    return ops_waiting;
 }
 
 uint8_t bus_ops_next(void)
 {
     ops_waiting--;
-    return ops >> ops_waiting & 1 ? PACKET_DC2 : PACKET_DC1;
+    return (uint8_t)(PACKET_DC1 + (ops >> ops_waiting & 1));
 }

@@ -10,7 +10,6 @@
 #ifndef NET_BUS_H
 #define NET_BUS_H
 
-#include <stdbool.h>
 #include <stdint.h>
 #include "net/packet.h"
 
@@ -32,20 +31,24 @@ void bus_init(void);
 
 packet_event_t bus_poll(void);
 
-/* Nothing is on its way in or out, and nothing has been for so many characters. */
-bool bus_free(uint8_t characters);
-bool bus_sending(void);
+/* Each is 0 or not. */
+uint8_t bus_free(uint8_t characters); /* nothing is on its way in or out, and nothing has been for so many characters */
+uint8_t bus_expects(void);            /* a packet is under way, or a soft op is to go out */
+uint8_t bus_sending(void);
+
+/* Not 0: something is to be done though nothing has come in; network_poll() says when it is over. */
+extern uint8_t bus_awake;
 
 /* With body and length in bus_packet, while bus_free(). crc: as the session says; strict packets have one always. */
-void bus_send(uint8_t destination, bool crc);
+void bus_send(uint8_t destination, uint8_t crc);
 
-bool bus_strict(void);
+uint8_t bus_strict(void);
 void bus_clear(void); /* the counters */
 
 /* -- soft ops: broadcasts that wait until the bus is free ---------------------------------------------------------- */
 
 void bus_ops(uint8_t byte); /* DC1, DC2; the newest are dropped when 8 are waiting */
-bool bus_ops_wait(void);
+uint8_t bus_ops_wait(void);
 uint8_t bus_ops_next(void); /* the one that has waited longest, taken out; only while there is one */
 
 #endif

@@ -12,6 +12,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+uint8_t bus_port_waiting(void); /* not 0: a byte has arrived */
 int16_t bus_port_get(void); /* the next byte that has arrived; -1: none */
 
 /* Tx En rises. The first byte that is put follows at least one bit time later. */

@@ -1,4 +1,5 @@
 #include "net/packet.h"
+#include <stdbool.h>
 #include "base/inline.h"
 
 enum { NOTHING, DESTINATION, ORIGIN, BODY, CRC, NUL };
@@ -21,7 +22,7 @@ static NOINLINE bool is_for(const packet_t *packet, uint8_t own)
     return packet->destination == own || packet->destination == PACKET_EVERYBODY;
 }
 
-packet_event_t packet_take(packet_t *packet, uint8_t byte, uint8_t own, bool strict)
+packet_event_t packet_take(packet_t *packet, uint8_t byte, uint8_t own, uint8_t strict)
 {
     NEAR(packet);
     const uint8_t expected = packet->expected;
@@ -75,7 +76,7 @@ packet_event_t packet_take(packet_t *packet, uint8_t byte, uint8_t own, bool str
     return event;
 }
 
-packet_event_t packet_end(packet_t *packet, uint8_t own, bool strict)
+packet_event_t packet_end(packet_t *packet, uint8_t own, uint8_t strict)
 {
     NEAR(packet);
     packet_event_t event = PACKET_BROKEN;
@@ -90,12 +91,12 @@ packet_event_t packet_end(packet_t *packet, uint8_t own, bool strict)
     return event;
 }
 
-bool packet_under_way(const packet_t *packet)
+uint8_t packet_under_way(const packet_t *packet)
 {
-    return packet->expected != NOTHING;
+    return packet->expected; /* NOTHING: 0 */
 }
 
-uint8_t packet_close(packet_t *packet, bool crc, bool strict)
+uint8_t packet_close(packet_t *packet, uint8_t crc, uint8_t strict)
 {
     NEAR(packet);
     packet->stx = PACKET_STX;

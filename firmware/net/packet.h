@@ -14,7 +14,6 @@
 #ifndef NET_PACKET_H
 #define NET_PACKET_H
 
-#include <stdbool.h>
 #include <stdint.h>
 
 /* A line of 64 characters without the one of its address, a sequence byte, a space for the CRC's sake. */
@@ -41,16 +40,16 @@ typedef enum {
 } packet_event_t;
 
 /* Of a packet for another node than `own` and everybody nothing is kept, and its end is PACKET_NONE. */
-packet_event_t packet_take(packet_t *packet, uint8_t byte, uint8_t own, bool strict);
+packet_event_t packet_take(packet_t *packet, uint8_t byte, uint8_t own, uint8_t strict);
 
 /* Nothing has come for so long that nothing will. An ACK or NAK of the short form (STX destination origin ACK) is whole
  * by that. */
-packet_event_t packet_end(packet_t *packet, uint8_t own, bool strict);
+packet_event_t packet_end(packet_t *packet, uint8_t own, uint8_t strict);
 
-bool packet_under_way(const packet_t *packet);
+uint8_t packet_under_way(const packet_t *packet);
 
 /* Body and length are set, addresses too: header and footer are added. Returns how many bytes are to be sent, from
  * packet->stx on. */
-uint8_t packet_close(packet_t *packet, bool crc, bool strict);
+uint8_t packet_close(packet_t *packet, uint8_t crc, uint8_t strict);
 
 #endif

@@ -8,14 +8,13 @@
 static bool raised;
 static uint8_t played; /* engine_commands_played() so far */
 
-static void signal(bool executing)
+static void signal(uint8_t byte)
 {
-    raised = executing;
+    raised = byte & 1u; /* OPS_BEGIN */
     if (settings.ops_mask != 0) {
-        ops_port_set(executing);
+        ops_port_set(raised);
     }
     if (session.options & SESSION_SOFT_OPS) {
-        const uint8_t byte = executing ? OPS_BEGIN : OPS_END;
         ops_port_send(byte);
         bus_ops(byte);
     }
@@ -27,13 +26,13 @@ void ops_poll(void)
     while (played != now) {
         played++;
         if (!raised) {
-            signal(true);
+            signal(OPS_BEGIN);
         }
-        signal(false);
+        signal(OPS_END);
     }
     const uint8_t state = (uint8_t)engine_state();
     if (!raised && state >= MOTION_ACCEL && state <= MOTION_DECEL && engine_commands_begun() != engine_commands_ended()) {
-        signal(true);
+        signal(OPS_BEGIN);
     }
 }
 

@@ -3,6 +3,7 @@
  * (make fuzz-packet-long: 10^9), SAC_FRAMES_SEED which. */
 #include "net/packet.h"
 #include <inttypes.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -305,7 +306,7 @@ static void test_silence_ends_a_packet_and_a_short_answer_is_whole_by_it(void)
         for (unsigned strict = 0; strict < 2; strict++) {
             unsigned events;
             (void)take(answers[i], 4, strict, &events);
-            TEST_ASSERT_EQUAL(strict ? PACKET_BROKEN : PACKET_WHOLE, packet_end(&packet, OWN, strict));
+            TEST_ASSERT_EQUAL(strict ? PACKET_BROKEN : PACKET_WHOLE, packet_end(&packet, OWN, (uint8_t)strict));
         }
         TEST_ASSERT_EQUAL_UINT8('\0', packet.body[1]);
     }

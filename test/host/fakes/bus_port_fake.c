@@ -73,12 +73,14 @@ void bus_port_fake_clear(void)
     sent_count = 0;
 }
 
+uint8_t bus_port_waiting(void)
+{
+    return taken_count != arriving_count && is_past(arriving[taken_count].at_us);
+}
+
 int16_t bus_port_get(void)
 {
-    if (taken_count == arriving_count || !is_past(arriving[taken_count].at_us)) {
-        return -1;
-    }
-    return arriving[taken_count++].byte;
+    return bus_port_waiting() ? arriving[taken_count++].byte : -1;
 }
 
 void bus_port_begin(void)
