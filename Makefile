@@ -178,10 +178,18 @@ AVR_SMALLER = -Os -mcall-prologues -mstrict-X -fno-gcse -fno-move-loop-invariant
     -flto -fno-tree-forwprop -fno-tree-dominator-opts -fno-inline-small-functions -fira-algorithm=priority -fira-region=all \
     -fno-tree-copy-prop -fno-tree-coalesce-vars -fno-tree-scev-cprop -fno-tree-reassoc -fno-tree-pta -flto-partition=none \
     $(if $(filter 5.%,$(AVR_VERSION)),-fno-tree-sink -fweb -fno-toplevel-reorder)
-# What suits single files. Arithmetic of 32 bits nearly throughout: smaller if the registers of a value stay together.
+# What suits single files, found by trying. (Arithmetic of 32 bits nearly throughout is smaller if the registers of a value
+# stay together.)
 SMALLER_firmware/motion/ramp.c := -fno-split-wide-types
 SMALLER_firmware/motion/profile.c := -fno-split-wide-types
 SMALLER_firmware/motion/engine.c := -ftree-dominator-opts -ftree-sink -fno-tree-fre -fno-tree-loop-optimize
+SMALLER_firmware/queue/queue.c := -fno-cprop-registers
+SMALLER_firmware/cli/network.c := -ftree-forwprop
+SMALLER_firmware/cli/display.c := -ftree-forwprop
+SMALLER_firmware/cli/commands.c := -ftree-sink
+SMALLER_firmware/cli/configure.c := -fno-forward-propagate
+SMALLER_firmware/cli/terminal.c := -fno-split-wide-types
+SMALLER_firmware/cli/motion_syntax.c := -ftree-dominator-opts
 AVR_CFLAGS = $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 $(AVR_SMALLER) -g -ffunction-sections -fdata-sections -fshort-enums \
     -fstack-usage -I$(BUILD)/packed -Ifirmware $(AVR_WARNINGS)
 AVR_LDFLAGS := $(AVR_MCU) -Wl,--gc-sections -mrelax -nostartfiles -T firmware/image.ld -Lfirmware

@@ -61,13 +61,14 @@ __attribute__((OS_main, section(".init9"))) int main(void)
         /* Cleared before the polls: what an interrupt leaves to do meanwhile is seen in this round or the next. */
         wake_flag = 0;
         boot_port_alive();
-        if (estop_port_poll()) {
+        uint8_t worked = 0;
+        const bool stopped = estop_port_poll();
+        if (stopped) {
             queue_stop();
         }
         if (ports_deaf() && !engine_hurries()) {
             ports_listen();
         }
-        bool worked = false;
         if (boot_over()) {
             if (saved) {
                 saved = false; /* once */
@@ -75,7 +76,7 @@ __attribute__((OS_main, section(".init9"))) int main(void)
                     (void)queue_loop_from_first(settings.autorun);
                 }
             }
-            worked = terminal_poll(); /* first: a line's end is what wakes a unit at rest, and its motion is awaited */
+            worked |= terminal_poll(); /* first: a line's end is what wakes a unit at rest, and its motion is awaited */
             worked |= network_poll();
         }
         if (trial_failed()) {
@@ -84,8 +85,10 @@ __attribute__((OS_main, section(".init9"))) int main(void)
         }
         worked |= encoder_poll();
         worked |= engine_poll();
-        worked |= queue_poll(); /* it knows what has begun before anybody asks or changes it */
-        ops_poll();
+        if (worked || stopped || engine_plays()) { /* else nothing has begun or ended, and a line's end need not wait */
+            worked |= queue_poll(); /* it knows what has begun before anybody asks or changes it */
+            ops_poll();
+        }
         worked |= store_poll();
         if (!worked) {
             wake_sleep();

@@ -275,7 +275,7 @@ static NOINLINE uint8_t attend(void)
             asked = FAILED; /* the line that waits for it tells */
         }
     }
-    const uint8_t at_work = (uint8_t)(owed | bus_sending());
+    const uint8_t at_work = (uint8_t)(event | owed | bus_sending());
     bus_awake = (uint8_t)(at_work | asked | commands_restart_due() | bus_expects());
     return at_work;
 }

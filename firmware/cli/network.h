@@ -22,7 +22,7 @@
 #define NETWORK_ANSWER_CHARACTERS 128
 
 void network_init(void);
-uint8_t network_poll(void); /* not 0: there is more to do */
+uint8_t network_poll(void); /* not 0: it did something, or there is more to do */
 
 /* A line for another node. STATUS_WAIT: not yet, ask again. */
 status_t network_send(uint8_t destination, const char *text);

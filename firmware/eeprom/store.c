@@ -298,7 +298,7 @@ static void save_on(void)
     }
 }
 
-bool store_poll(void)
+uint8_t store_poll(void)
 {
     if (!store_busy()) {
         return false;

@@ -63,6 +63,6 @@ store_queue_t store_load_queue(void *entries);
 
 uint8_t store_busy(void); /* not 0: something is being written */
 
-bool store_poll(void); /* writes on; true while store_busy(): call again without sleeping */
+uint8_t store_poll(void); /* writes on; not 0 while store_busy(): call again without sleeping */
 
 #endif

@@ -1224,16 +1224,16 @@ void engine_release(void)
     step_port_release();
 }
 
-static NOINLINE bool play_on(void)
+static NOINLINE uint8_t play_on(void)
 {
-    bool worked = false;
+    uint8_t worked = 0;
     look_for_end();
     if (step_late) {
         step_late = 0;
         engine.faults |= ENGINE_FAULT_LATE;
     }
     if (engine.playing && step_idle) {
-        worked = true;
+        worked = 1;
         if (!step_port_snapshot().period_over) {
             /* The last period is not over. */
         } else if (step_head != step_tail) {
@@ -1261,16 +1261,21 @@ static NOINLINE bool play_on(void)
             uint8_t least = block.runs ? RING_REFILL : RING_RESERVE;
             if (ring_free() < least || !emit())
                 break;
-            worked = true;
+            worked = 1;
         } while (ring_free() > SEGMENT_COUNT / 4 * SEGMENT_BYTES && !step_idle && --rounds);
     }
     return worked;
 }
 
-NOINLINE bool engine_poll(void) /* (the benchmark measures it) */
+NOINLINE uint8_t engine_poll(void) /* (the benchmark measures it) */
 {
     /* In standstill a line's end must not wait for all those registers to be saved. */
     return (engine.playing || step_late) && play_on();
+}
+
+bool engine_plays(void)
+{
+    return engine.playing;
 }
 
 uint8_t engine_hurries(void)

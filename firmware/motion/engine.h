@@ -35,8 +35,9 @@ void engine_on_start(void);
  * The sync pin does the same by itself. With nothing held nothing happens. */
 void engine_release(void);
 
-/* Keeps the segment ring filled. Call often; returns true if it did some work. */
-bool engine_poll(void);
+/* Keeps the segment ring filled. Call often; not 0 if it did some work. */
+uint8_t engine_poll(void);
+bool engine_plays(void); /* pulses or silence: something may end */
 
 /* Not 0: periods are being played, or in the ring, that bear no start edge's interrupt before the step interrupt. */
 uint8_t engine_hurries(void);

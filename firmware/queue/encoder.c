@@ -16,7 +16,7 @@ static void look(void)
     }
 }
 
-bool encoder_poll(void)
+uint8_t encoder_poll(void)
 {
     look();
     int8_t lines = encoder_take();

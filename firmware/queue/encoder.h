@@ -11,7 +11,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-bool encoder_poll(void); /* call often; true if there was something to do */
+uint8_t encoder_poll(void); /* call often; not 0 if there was something to do */
 
 void encoder_toggle(void); /* $n */
 

@@ -137,7 +137,7 @@ static NOINLINE void advance(void)
 }
 
 /* Accounts for what the engine has begun; before anything changes what is chosen. */
-static NOINLINE bool note_begun(void)
+static NOINLINE uint8_t note_begun(void)
 {
     struct queue *const queue = self();
     if (queue->begun == engine_commands_begun()) {
@@ -149,23 +149,23 @@ static NOINLINE bool note_begun(void)
 }
 
 /* True if it has begun: at standstill that is at once. */
-static NOINLINE bool offer(void)
+static NOINLINE uint8_t offer(void)
 {
     const uint8_t position = choose();
     engine_offer(position == NONE ? 0 : entry_at(position));
     return note_begun();
 }
 
-bool queue_poll(void)
+uint8_t queue_poll(void)
 {
-    const bool changed = note_begun();
+    const uint8_t changed = note_begun();
     if (the_queue.due != END_NOT && engine_next(the_queue.due == END_GRACEFULLY)) {
         the_queue.due = END_NOT;
     }
     if (the_queue.run != RUN_NOTHING && is_over() && !queue_is_executing()) {
         end_loop();
     }
-    return offer() | changed;
+    return (uint8_t)(offer() | changed);
 }
 
 /* One revolution each, else the session defaults. */
@@ -228,16 +228,19 @@ status_t queue_restore(bool *saved)
 
 /* -- what is written --------------------------------------------------------------------------------------------- */
 
+typedef uint16_t __attribute__((may_alias, aligned(1))) pair_t;
+_Static_assert(sizeof(motion_command_t) % sizeof(pair_t) == 0, "write() copies all of it");
+
 static void write(uint8_t position, const motion_command_t *command, bool added)
 {
     struct queue *const queue = self();
     queue->undo_position = position;
     queue->undo_added = added;
-    /* Both copies in one loop: time counts. */
-    uint8_t *to = (uint8_t *)entry_at(position);
-    uint8_t *kept = (uint8_t *)&queue->undo;
-    const uint8_t *from = (const uint8_t *)command;
-    for (uint8_t left = sizeof queue->undo; left > 0; left--) {
+    /* Both copies in one loop, two bytes at a time: time counts. */
+    pair_t *to = (pair_t *)entry_at(position);
+    pair_t *kept = (pair_t *)&queue->undo;
+    const pair_t *from = (const pair_t *)command;
+    for (uint8_t left = sizeof queue->undo / sizeof *to; left > 0; left--) {
         *kept++ = *to;
         *to++ = *from++;
     }

@@ -58,8 +58,8 @@ void queue_follow(const motion_command_t *command);
 /* It becomes so many RPM faster, or slower (to 1 RPM at least), by its own acceleration; other motion does not change. */
 void queue_throttle(int8_t rpm);
 
-/* Gives the engine what comes next; true if anything changed. Call often. */
-bool queue_poll(void);
+/* Gives the engine what comes next; not 0 if anything changed. Call often. */
+uint8_t queue_poll(void);
 
 /* The loop from a start to a finish, 1..30 and not the same (STATUS_LOOP_BOUNDS): begins once both are known, after the
  * running command; may be changed while it runs. autorun: 1 to `finish`, where they may be the same. */
