@@ -42,7 +42,7 @@ status_t engine_check(const motion_command_t *command)
 
 void engine_init(void) {}
 
-bool engine_poll(void)
+uint8_t engine_poll(void)
 {
     return false;
 }
