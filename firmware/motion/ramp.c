@@ -11,11 +11,6 @@
 #include "motion/group_layout.h"
 #include <string.h>
 
-#define GROUP_MAX_LOG2 9u
-#define ODD_GROUP_LEAST 16u /* pulses of a group that are not a power of two */
-#define REST_PULSES 64u /* the least that is left for a fast ramp's last run */
-#define GROUP_MAX_TICKS 64000u /* below 65,536: intervals that grow are taken for longer than they are ... */
-#define GROUP_MAX_STEEP_TICKS 49152u /* ... by up to a third, in a steep ramp */
 /* Of velocity units squared, a pulse, for a hundredth of rad/s^2, times steps_per_rev: 360,000 / pi * 2^15. */
 #define LINEAR_SQUARE_Q15 3754936206u
 #define LINEAR_STEEP_LOG2 (LINEAR_RATE_LOG2 + 2u - 28u) /* first intervals below 2^14 ticks: 4 K^2 / c below 2^28 */
@@ -69,11 +64,143 @@ NOINLINE uint32_t ramp_velocity(const ramp_constants_t *constants, uint32_t tick
 }
 
 /* The interval, in 1/65536, to choose the next group by. */
-static NOINLINE void set_ticks(ramp_t *ramp, const wide_t *q16)
+NOINLINE void set_ticks(ramp_t *ramp, const wide_t *q16)
 {
     uint32_t ticks = (uint32_t)wide_from_byte(q16, 2);
     ramp->ticks = ticks > UINT16_MAX ? UINT16_MAX : (uint16_t)ticks;
 }
+
+/* -- the laws ----------------------------------------------------------------------------------------------------- */
+
+/* x * 2^up / divisor, of as many bits as there is room for. */
+static NOINLINE void divide_scaled(wide_t *x, uint32_t divisor, int8_t up)
+{
+    int8_t room = (int8_t)(64 - wide_bits(x));
+    int8_t before = up < room ? up : room;
+    wide_shift(x, (int8_t)-before);
+    wide_divide(x, divisor);
+    wide_shift(x, (int8_t)(before - up));
+}
+
+void ramp_square(wide_t *x, uint32_t v)
+{
+    wide_set(x, v);
+    wide_multiply(x, v);
+}
+
+/* Linear: velocity units so many times twice as large, or half as large (below 0). K gets what it has room for. */
+static NOINLINE void scale_k(ramp_t *ramp, int8_t by)
+{
+    NEAR(ramp);
+    int8_t up = (int8_t)(ramp->k_lacks - by);
+    int8_t room = (int8_t)(64 - wide_bits(&ramp->k2_q16));
+    ramp->k_lacks = 0;
+    if (up > room) {
+        ramp->k_lacks = (uint8_t)(up - room);
+        up = room;
+    }
+    wide_shift(&ramp->k2_q16, (int8_t)-up);
+}
+
+/* As fine as they can be. */
+NOINLINE void choose_units(ramp_t *ramp)
+{
+    NEAR(ramp);
+    uint8_t bits = wide_bits(&ramp->x);
+    uint8_t bits_of_c = wide_bits(&ramp->c);
+    if (bits < bits_of_c)
+        bits = bits_of_c;
+    int8_t by = (int8_t)((int8_t)(bits - 59) / 2);
+    if (by == 0)
+        return;
+    scale_k(ramp, by);
+    by = (int8_t)(2 * by);
+    wide_shift(&ramp->x, by);
+    wide_shift(&ramp->c, by);
+    ramp->v = wide_root(&ramp->x);
+}
+
+static void begin_linear(ramp_t *ramp, const ramp_constants_t *constants, uint32_t k_by_128, uint32_t v_most,
+                         uint32_t pulses)
+{
+    NEAR(ramp);
+    wide_t *c = &ramp->c;
+    wide_t *x = &ramp->x;
+    wide_set(x, v_most);
+    uint8_t scale = (uint8_t)(30 - wide_bits(x));
+    scale_k(ramp, (int8_t)-scale);
+    ramp->v <<= scale;
+    uint8_t scale2 = (uint8_t)(2 * scale);
+    uint32_t divisor = pulses;
+    int8_t up = (int8_t)scale2;
+    if (ramp->step) {
+        wide_set(c, ramp->step);
+        wide_multiply(c, LINEAR_SQUARE_Q15);
+        divisor = constants->steps_per_rev;
+        up = (int8_t)(scale2 - 15);
+    } else {
+        ramp_square(c, v_most);
+    }
+    divide_scaled(c, divisor, up);
+    wide_copy(x, c);
+    divide_scaled(x, k_by_128, (int8_t)(LINEAR_RATE_LOG2 - 14u - scale2));
+    wide_divide(x, k_by_128);
+    ramp->rate = wide_half(x, 0);
+    uint8_t bits = wide_bits(x);
+    uint8_t most_bits = (uint8_t)(LINEAR_STEEP_LOG2 - 6u + 2u * ramp->cycles_log2);
+    ramp->steep = (uint8_t)((bits > most_bits) + (bits > (uint8_t)(most_bits + 6)));
+    ramp_square(x, ramp->v);
+    if (ramp->v == 0 && !ramp->faster) {
+        wide_copy(x, c);
+        wide_multiply(x, pulses); /* exactly to a standstill */
+        ramp->v = wide_root(x);
+    }
+    choose_units(ramp);
+}
+
+/* 2 K / v2 */
+NOINLINE void ramp_set_interval(ramp_t *ramp, wide_t *interval_q16, uint32_t v2)
+{
+    NEAR(ramp);
+    divide_k(interval_q16, &ramp->k2_q16, v2);
+    wide_shift(interval_q16, (int8_t)-ramp->k_lacks);
+    set_ticks(ramp, interval_q16);
+}
+
+NOINLINE void ramp_begin(ramp_t *ramp, const ramp_constants_t *constants, uint32_t v_most, uint32_t pulses)
+{
+    ramp->rest = false;
+    ramp->bounded = false;
+    ramp->run_pulses = 0;
+    ramp->k_lacks = 0;
+    ramp->least_run = 1;
+    ramp->cycles_log2 = constants->cycles_log2;
+    ramp->split_ticks = constants->split_ticks;
+    ramp->group_log2 = ramp->most_log2 = GROUP_MAX_LOG2;
+    wide_copy(&ramp->k2_q16, &constants->k2_q16);
+    uint32_t k_by_128 = (uint32_t)wide_from_byte(&constants->k2_q16, 3);
+    uint32_t first2;
+    if (ramp->linear) {
+        begin_linear(ramp, constants, k_by_128, v_most, pulses);
+        first2 = 2 * ramp->v;
+        if (first2 == 0)
+            first2 = wide_root(&ramp->c);
+    } else {
+        uint32_t step = ramp->step;
+        uint32_t steep = k_by_128 >> (10u - ramp->cycles_log2); /* K / 2^17; a third: 2^18.6 */
+        ramp->steep = (uint8_t)((step > steep) + (3 * step > steep));
+        wide_t *rate = &ramp->x;
+        wide_set(rate, 0);
+        wide_set_upper(rate, 2 * step);
+        wide_divide(rate, k_by_128);
+        ramp->rate = wide_half(rate, 1) ? UINT32_MAX : wide_half(rate, 0);
+        first2 = 2 * (ramp->v < ramp->limit.cap ? ramp->v : ramp->limit.cap);
+    }
+    wide_t interval_q16;
+    ramp_set_interval(ramp, &interval_q16, first2);
+}
+
+#if !defined __AVR__ || defined RAMP_IN_C
 
 /* -- groups ------------------------------------------------------------------------------------------------------ */
 
@@ -142,136 +269,6 @@ static NOINLINE uint16_t choose_group(ramp_t *ramp, uint16_t left)
     return left;
 }
 
-/* -- the laws ----------------------------------------------------------------------------------------------------- */
-
-/* x * 2^up / divisor, of as many bits as there is room for. */
-static NOINLINE void divide_scaled(wide_t *x, uint32_t divisor, int8_t up)
-{
-    int8_t room = (int8_t)(64 - wide_bits(x));
-    int8_t before = up < room ? up : room;
-    wide_shift(x, (int8_t)-before);
-    wide_divide(x, divisor);
-    wide_shift(x, (int8_t)(before - up));
-}
-
-void ramp_square(wide_t *x, uint32_t v)
-{
-    wide_set(x, v);
-    wide_multiply(x, v);
-}
-
-/* Linear: velocity units so many times twice as large, or half as large (below 0). K gets what it has room for. */
-static NOINLINE void scale_k(ramp_t *ramp, int8_t by)
-{
-    NEAR(ramp);
-    int8_t up = (int8_t)(ramp->k_lacks - by);
-    int8_t room = (int8_t)(64 - wide_bits(&ramp->k2_q16));
-    ramp->k_lacks = 0;
-    if (up > room) {
-        ramp->k_lacks = (uint8_t)(up - room);
-        up = room;
-    }
-    wide_shift(&ramp->k2_q16, (int8_t)-up);
-}
-
-/* As fine as they can be. */
-static NOINLINE void choose_units(ramp_t *ramp)
-{
-    NEAR(ramp);
-    uint8_t bits = wide_bits(&ramp->x);
-    uint8_t bits_of_c = wide_bits(&ramp->c);
-    if (bits < bits_of_c)
-        bits = bits_of_c;
-    int8_t by = (int8_t)((int8_t)(bits - 59) / 2);
-    if (by == 0)
-        return;
-    scale_k(ramp, by);
-    by = (int8_t)(2 * by);
-    wide_shift(&ramp->x, by);
-    wide_shift(&ramp->c, by);
-    ramp->v = wide_root(&ramp->x);
-}
-
-static void begin_linear(ramp_t *ramp, const ramp_constants_t *constants, uint32_t k_by_128, uint32_t v_most,
-                         uint32_t pulses)
-{
-    NEAR(ramp);
-    wide_t *c = &ramp->c;
-    wide_t *x = &ramp->x;
-    wide_set(x, v_most);
-    uint8_t scale = (uint8_t)(30 - wide_bits(x));
-    scale_k(ramp, (int8_t)-scale);
-    ramp->v <<= scale;
-    uint8_t scale2 = (uint8_t)(2 * scale);
-    uint32_t divisor = pulses;
-    int8_t up = (int8_t)scale2;
-    if (ramp->step) {
-        wide_set(c, ramp->step);
-        wide_multiply(c, LINEAR_SQUARE_Q15);
-        divisor = constants->steps_per_rev;
-        up = (int8_t)(scale2 - 15);
-    } else {
-        ramp_square(c, v_most);
-    }
-    divide_scaled(c, divisor, up);
-    wide_copy(x, c);
-    divide_scaled(x, k_by_128, (int8_t)(LINEAR_RATE_LOG2 - 14u - scale2));
-    wide_divide(x, k_by_128);
-    ramp->rate = wide_half(x, 0);
-    uint8_t bits = wide_bits(x);
-    uint8_t most_bits = (uint8_t)(LINEAR_STEEP_LOG2 - 6u + 2u * ramp->cycles_log2);
-    ramp->steep = (uint8_t)((bits > most_bits) + (bits > (uint8_t)(most_bits + 6)));
-    ramp_square(x, ramp->v);
-    if (ramp->v == 0 && !ramp->faster) {
-        wide_copy(x, c);
-        wide_multiply(x, pulses); /* exactly to a standstill */
-        ramp->v = wide_root(x);
-    }
-    choose_units(ramp);
-}
-
-/* 2 K / v2 */
-static NOINLINE void set_interval(ramp_t *ramp, wide_t *interval_q16, uint32_t v2)
-{
-    NEAR(ramp);
-    divide_k(interval_q16, &ramp->k2_q16, v2);
-    wide_shift(interval_q16, (int8_t)-ramp->k_lacks);
-    set_ticks(ramp, interval_q16);
-}
-
-NOINLINE void ramp_begin(ramp_t *ramp, const ramp_constants_t *constants, uint32_t v_most, uint32_t pulses)
-{
-    ramp->rest = false;
-    ramp->bounded = false;
-    ramp->run_pulses = 0;
-    ramp->k_lacks = 0;
-    ramp->least_run = 1;
-    ramp->cycles_log2 = constants->cycles_log2;
-    ramp->split_ticks = constants->split_ticks;
-    ramp->group_log2 = ramp->most_log2 = GROUP_MAX_LOG2;
-    wide_copy(&ramp->k2_q16, &constants->k2_q16);
-    uint32_t k_by_128 = (uint32_t)wide_from_byte(&constants->k2_q16, 3);
-    uint32_t first2;
-    if (ramp->linear) {
-        begin_linear(ramp, constants, k_by_128, v_most, pulses);
-        first2 = 2 * ramp->v;
-        if (first2 == 0)
-            first2 = wide_root(&ramp->c);
-    } else {
-        uint32_t step = ramp->step;
-        uint32_t steep = k_by_128 >> (10u - ramp->cycles_log2); /* K / 2^17; a third: 2^18.6 */
-        ramp->steep = (uint8_t)((step > steep) + (3 * step > steep));
-        wide_t *rate = &ramp->x;
-        wide_set(rate, 0);
-        wide_set_upper(rate, 2 * step);
-        wide_divide(rate, k_by_128);
-        ramp->rate = wide_half(rate, 1) ? UINT32_MAX : wide_half(rate, 0);
-        first2 = 2 * (ramp->v < ramp->limit.cap ? ramp->v : ramp->limit.cap);
-    }
-    wide_t interval_q16;
-    set_interval(ramp, &interval_q16, first2);
-}
-
 /* The next group of a law: its pulses, and the interval at the mean of the velocities at both ends. */
 
 static uint16_t harmonic_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16)
@@ -291,7 +288,7 @@ static uint16_t harmonic_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16)
     uint32_t change = step * pulses;
     uint32_t v_end = v + change;
     ramp->v = v_end;
-    set_interval(ramp, interval_q16, ramp->bounded ? 2 * cap : v + v_end - step);
+    ramp_set_interval(ramp, interval_q16, ramp->bounded ? 2 * cap : v + v_end - step);
     return pulses;
 }
 
@@ -305,32 +302,29 @@ static uint16_t linear_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16, w
     wide_change(&ramp->x, change, ramp->faster);
     uint32_t v = ramp->v;
     ramp->v = wide_is_negative(&ramp->x) ? 0 : wide_root(&ramp->x);
-    set_interval(ramp, interval_q16, v + ramp->v + 1); /* roots are rounded down */
+    ramp_set_interval(ramp, interval_q16, v + ramp->v + 1); /* roots are rounded down */
     return pulses;
 }
 
 /* -- both -------------------------------------------------------------------------------------------------------- */
 
-uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *block)
+uint16_t ramp_next(ramp_t *ramp, uint16_t left, ramp_time_t *sum, block_t *block)
 {
-    uint16_t few = (uint16_t)left;
-    if (left > 4u << GROUP_MAX_LOG2)
-        few = 4u << GROUP_MAX_LOG2;
     uint16_t pulses;
     group_t group;
     for (;;) {
         wide_t change;
         bool goes_on = false;
         if (!ramp->linear) {
-            pulses = harmonic_next(ramp, few, &group.sum_q16);
+            pulses = harmonic_next(ramp, left, &group.sum_q16);
         } else if (!ramp->bounded) {
             goes_on = true;
-            pulses = linear_next(ramp, few, &group.sum_q16, &change);
+            pulses = linear_next(ramp, left, &group.sum_q16, &change);
             wide_copy(&group.end_q16, &group.sum_q16);
         } else {
             wide_copy(&group.sum_q16, &ramp->limit.bound_q16);
             set_ticks(ramp, &group.sum_q16);
-            pulses = choose_group(ramp, few);
+            pulses = choose_group(ramp, left);
         }
         block->runs = 0;
         if (ramp->bounded)
@@ -351,7 +345,7 @@ uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *block
             /* All that is left: equal intervals, from this one on. */
             ramp->most_log2 = GROUP_MAX_LOG2;
             ramp->bounded = true;
-            few = 1;
+            left = 1;
         }
     }
     if (ramp->bounded)
@@ -361,3 +355,4 @@ uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *block
     set_time(sum, &group.sum_q16);
     return pulses;
 }
+#endif

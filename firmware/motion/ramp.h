@@ -21,8 +21,8 @@
 #include "motion/block.h"
 
 typedef struct {
-    uint32_t ticks;
     uint16_t frac_q16; /* 1/65536 tick */
+    uint32_t ticks;
 } ramp_time_t;
 
 /* What ramps depend on: motor and clock. */
@@ -84,6 +84,6 @@ void ramp_square(wide_t *x, uint32_t v);
 /* The next group of at most `left` pulses (>= 1): returns how many, up to 512, and the sum of their intervals; that of
  * several is below 65,536 ticks. How these follow each other: `block`, of which runs, pulses, top, slope and curve are set,
  * carry and width lost; no runs: alike. */
-uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *block);
+uint16_t ramp_next(ramp_t *ramp, uint16_t left, ramp_time_t *sum, block_t *block);
 
 #endif

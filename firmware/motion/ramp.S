@@ -1,0 +1,417 @@
+/* ramp_next() of ramp.h for the AVR. The C version in ramp.c, where the reasons are, is what runs on the host. */
+#include "base/registers.h"
+#include "motion/group_layout.h"
+
+/* Y: the ramp; r16, r17: a group_t in the frame; r14, r15: the block; r12, r13: where the sum goes; r10, r11: pulses left;
+ * r8, r9: the group's pulses. Others are each function's own. */
+
+        .section .text.ramp_next, "ax", @progbits
+        .global ramp_next
+        .type ramp_next, @function
+ramp_next:                      /* r24 ramp, r22 left, r20 sum, r18 block; returns r24 */
+        save_registers frame=GROUP_SIZE
+        movw    r16, r28
+        subi    r16, lo8(-1)
+        sbci    r17, hi8(-1)
+        movw    r28, r24
+        movw    r10, r22
+        movw    r12, r20
+        movw    r14, r18
+
+again:  ldd     r24, Y + RAMP_LINEAR
+        sbrs    r24, 0
+        rjmp    harmonic
+        ldd     r24, Y + RAMP_BOUNDED
+        sbrs    r24, 0
+        rjmp    linear
+        ldi     r22, RAMP_LIMIT
+        rcall   copy_member
+        movw    r22, r16
+        movw    r24, r28
+        call    set_ticks
+        rcall   choose_group_of_left
+
+/* Intervals that are equal. */
+bounded:
+        movw    r30, r14
+        std     Z + BLOCK_RUNS, r1
+        rcall   times_pulses
+        std     Y + RAMP_REST, r1
+        rjmp    leave
+
+/* r4-r7: v, in units at which x and c are as fine as they can be */
+linear: movw    r24, r28
+        call    choose_units
+        rcall   choose_group_of_left
+        rcall   load_v
+        ldd     r20, Y + RAMP_FASTER
+        rcall   change_square
+        sec                     /* roots are rounded down */
+        rjmp    mean
+
+/* r2, r3: pulses left, or to the limit; r4-r7: v at the first pulse */
+harmonic:
+        ldd     r22, Y + RAMP_V
+        ldd     r23, Y + RAMP_V + 1
+        ldd     r24, Y + RAMP_V + 2
+        ldd     r25, Y + RAMP_V + 3
+        ldd     r18, Y + RAMP_LIMIT
+        ldd     r19, Y + RAMP_LIMIT + 1
+        ldd     r20, Y + RAMP_LIMIT + 2
+        ldd     r21, Y + RAMP_LIMIT + 3
+        movw    r2, r10
+        std     Y + RAMP_BOUNDED, r1
+        cp      r18, r22
+        cpc     r19, r23
+        cpc     r20, r24
+        cpc     r21, r25
+        brsh    1f
+        ldi     r26, 1
+        std     Y + RAMP_BOUNDED, r26
+        sub     r22, r18
+        sbc     r23, r19
+        sbc     r24, r20
+        sbc     r25, r21
+        rcall   load_step
+        call    __udivmodsi4    /* r22-r25 by r18-r21: quotient in the latter */
+        sec                     /* one more */
+        cpc     r2, r18
+        cpc     r3, r19
+        cpc     r1, r20
+        cpc     r1, r21
+        brlo    1f
+        movw    r2, r18
+        sec
+        adc     r2, r1
+        adc     r3, r1
+1:      movw    r24, r2
+        rcall   choose_group
+        rcall   load_v
+        rcall   load_step
+        ldd     r0, Y + RAMP_FASTER
+        sbrc    r0, 0
+        rjmp    2f
+        com     r21
+        com     r20
+        com     r19
+        neg     r18
+        sbci    r19, -1
+        sbci    r20, -1
+        sbci    r21, -1
+2:      movw    r26, r8
+        call    __muluhisi3     /* r22-r25; leaves r18-r21 alone */
+        add     r22, r4
+        adc     r23, r5
+        adc     r24, r6
+        adc     r25, r7
+        rcall   store_v
+        ldd     r0, Y + RAMP_BOUNDED
+        sbrs    r0, 0
+        rjmp    3f
+        ldd     r4, Y + RAMP_LIMIT
+        ldd     r5, Y + RAMP_LIMIT + 1
+        ldd     r6, Y + RAMP_LIMIT + 2
+        ldd     r7, Y + RAMP_LIMIT + 3
+        movw    r22, r4
+        movw    r24, r6
+        rjmp    4f
+3:      sub     r22, r18        /* velocities are those of pulses */
+        sbc     r23, r19
+        sbc     r24, r20
+        sbc     r25, r21
+4:      clc
+
+/* The interval at the mean of two velocities: r4-r7, and r22-r25 with the carry. */
+mean:   adc     r22, r4
+        adc     r23, r5
+        adc     r24, r6
+        adc     r25, r7
+        movw    r18, r22
+        movw    r20, r24
+        movw    r22, r16
+        movw    r24, r28
+        call    ramp_set_interval
+        ldd     r24, Y + RAMP_BOUNDED
+        sbrc    r24, 0
+        rjmp    bounded
+        movw    r24, r16
+        adiw    r24, GROUP_END
+        movw    r22, r16
+        call    wide_copy
+        movw    r30, r14
+        std     Z + BLOCK_RUNS, r1
+        movw    r24, r8
+        sbiw    r24, 2
+        brlo    1f
+        movw    r24, r28
+        movw    r22, r16
+        movw    r20, r14
+        movw    r18, r8
+        call    group_plan
+1:      ldd     r24, Y + RAMP_LINEAR
+        sbrs    r24, 0
+        rjmp    2f
+        movw    r24, r16
+        adiw    r24, GROUP_END
+        movw    r22, r28
+        subi    r22, lo8(-(RAMP_LIMIT))
+        sbci    r23, hi8(-(RAMP_LIMIT))
+        call    wide_subtract
+        movw    r30, r16
+        ldd     r24, Z + GROUP_END + 7
+        ldd     r20, Y + RAMP_FASTER
+        lsl     r24
+        mov     r24, r20
+        adc     r24, r1         /* lowest bit: within the limit */
+        sbrs    r24, 0
+        rjmp    beyond
+2:      movw    r30, r14
+        ldd     r24, Z + BLOCK_RUNS
+        tst     r24
+        breq    leave
+        ldd     r24, Z + BLOCK_PULSES
+        std     Y + RAMP_RUN_PULSES, r24
+
+leave:  movw    r30, r16
+        movw    r26, r12
+        ldi     r18, RAMP_TIME_SIZE
+1:      ld      r0, Z+
+        st      X+, r0
+        dec     r18
+        brne    1b
+        movw    r24, r8
+        restore_registers frame=GROUP_SIZE
+
+/* Beyond the limit: fewer pulses, or all that is left at equal intervals, from this one on. */
+beyond: ldi     r24, 1
+        eor     r20, r24
+        rcall   change_square
+        movw    r24, r8
+        sbiw    r24, 2
+        ldd     r24, Y + RAMP_GROUP_LOG2
+        dec     r24
+        brsh    1f
+        ldi     r24, 1
+        std     Y + RAMP_BOUNDED, r24
+        movw    r10, r8
+        ldi     r24, GROUP_MAX_LOG2
+1:      std     Y + RAMP_MOST_LOG2, r24
+        rjmp    again
+
+/* r20: whether v^2 grows by the change of all pulses, or shrinks by it; v follows, returned in r22-r25. The sum is lost. */
+change_square:
+        push    r20
+        ldi     r22, RAMP_C
+        rcall   copy_member
+        rcall   times_pulses
+        pop     r20
+        movw    r22, r16
+        movw    r24, r28
+        adiw    r24, RAMP_X
+        call    wide_change
+        ldd     r18, Y + RAMP_X + 7
+        clr     r22
+        clr     r23
+        movw    r24, r22
+        sbrc    r18, 7
+        rjmp    store_v
+        movw    r24, r28
+        adiw    r24, RAMP_X
+        call    wide_root
+store_v:
+        std     Y + RAMP_V, r22
+        std     Y + RAMP_V + 1, r23
+        std     Y + RAMP_V + 2, r24
+        std     Y + RAMP_V + 3, r25
+        ret
+
+load_v:
+        ldd     r4, Y + RAMP_V
+        ldd     r5, Y + RAMP_V + 1
+        ldd     r6, Y + RAMP_V + 2
+        ldd     r7, Y + RAMP_V + 3
+        ret
+
+load_step:
+        ldd     r18, Y + RAMP_STEP
+        ldd     r19, Y + RAMP_STEP + 1
+        ldd     r20, Y + RAMP_STEP + 2
+        ldd     r21, Y + RAMP_STEP + 3
+        ret
+
+/* The sum becomes the ramp's number at r22. */
+copy_member:
+        clr     r23
+        add     r22, r28
+        adc     r23, r29
+        movw    r24, r16
+        jmp     wide_copy
+
+/* The sum, by the pulses. */
+times_pulses:
+        movw    r20, r8
+        clr     r22
+        clr     r23
+        movw    r24, r16
+        jmp     wide_multiply
+
+/* r8, r9: how many pulses the next group has, of those left, or of r24, r25. r2: the most doublings of a pulse, r3: so many;
+ * r22, r23: their pulses; r26, r27: ticks; r30, r31: the most, halved by each doubling; r4-r7: change of the law's variable
+ * a pulse; r18-r21: the most of all pulses, halved as well. */
+choose_group_of_left:
+        movw    r24, r10
+choose_group:
+        ldi     r22, 1
+        ldi     r23, 0
+        ldd     r26, Y + RAMP_TICKS
+        ldd     r27, Y + RAMP_TICKS + 1
+        std     Y + RAMP_REST, r1
+        ldd     r18, Y + RAMP_SPLIT_TICKS
+        cp      r26, r18
+        cpc     r27, r1
+        brsh    2f
+        cpi     r24, 2 * REST_PULSES
+        cpc     r25, r1
+        brsh    1f
+        std     Y + RAMP_REST, r22
+        rjmp    2f
+1:      subi    r24, REST_PULSES
+        sbc     r25, r1
+2:      cpi     r26, lo8(GROUP_MAX_TICKS / 2 + 1)
+        ldi     r18, hi8(GROUP_MAX_TICKS / 2 + 1)
+        cpc     r27, r18
+        brlo    3f
+        std     Y + RAMP_GROUP_LOG2, r1
+        rjmp    9f
+3:      ldd     r4, Y + RAMP_STEP
+        ldd     r5, Y + RAMP_STEP + 1
+        ldd     r6, Y + RAMP_STEP + 2
+        ldd     r7, Y + RAMP_STEP + 3
+        ldd     r18, Y + RAMP_V
+        ldd     r19, Y + RAMP_V + 1
+        ldd     r20, Y + RAMP_V + 2
+        ldd     r21, Y + RAMP_V + 3
+        ldd     r0, Y + RAMP_LINEAR
+        sbrs    r0, 0
+        rjmp    4f
+        ldd     r4, Y + RAMP_C + 4
+        ldd     r5, Y + RAMP_C + 5
+        ldd     r6, Y + RAMP_C + 6
+        ldd     r7, Y + RAMP_C + 7
+        ldd     r18, Y + RAMP_X + 4
+        ldd     r19, Y + RAMP_X + 5
+        ldd     r20, Y + RAMP_X + 6
+        ldd     r21, Y + RAMP_X + 7
+        lsl     r18
+        rol     r19
+        rol     r20
+        rol     r21
+4:      ldd     r0, Y + RAMP_BOUNDED
+        sbrs    r0, 0
+        rjmp    5f
+        clr     r4
+        clr     r5
+        movw    r6, r4
+5:      clr     r30
+        ldi     r31, hi8(GROUP_MAX_STEEP_TICKS)
+        ldd     r2, Y + RAMP_STEEP
+        ldi     r22, 1          /* by what part of its value the variable may change: a power of two */
+        sbrc    r2, 1
+        rjmp    6f
+        ldi     r31, hi8(GROUP_MAX_TICKS)
+        ldi     r22, 2
+        cpi     r26, 128
+        cpc     r27, r1
+        brlo    6f
+        ldi     r22, 3
+6:      movw    r2, r26
+7:      lsr     r21
+        ror     r20
+        ror     r19
+        ror     r18
+        lsr     r3
+        ror     r2
+        dec     r22
+        brne    7b
+        ldd     r0, Y + RAMP_FASTER
+        sbrc    r0, 0
+        rjmp    1f
+        add     r26, r2         /* they grow, and the variable shrinks */
+        adc     r27, r3
+        movw    r2, r18
+        movw    r22, r20
+        lsr     r23
+        ror     r22
+        ror     r3
+        ror     r2
+        lsr     r23
+        ror     r22
+        ror     r3
+        ror     r2
+        sub     r18, r2
+        sbc     r19, r3
+        sbc     r20, r22
+        sbc     r21, r23
+1:      ldd     r2, Y + RAMP_GROUP_LOG2
+        inc     r2
+        ldd     r22, Y + RAMP_MOST_LOG2
+        cp      r2, r22
+        brlo    2f
+        mov     r2, r22
+2:      clr     r3
+        ldi     r22, 1
+        ldi     r23, 0
+3:      cp      r3, r2
+        brsh    4f
+        lsr     r31
+        ror     r30
+        cp      r30, r26
+        cpc     r31, r27
+        brlo    4f
+        lsr     r21
+        ror     r20
+        ror     r19
+        ror     r18
+        cp      r18, r4
+        cpc     r19, r5
+        cpc     r20, r6
+        cpc     r21, r7
+        brlo    4f
+        lsl     r22
+        rol     r23
+        inc     r3
+        rjmp    3b
+4:      std     Y + RAMP_GROUP_LOG2, r3
+        cp      r24, r22
+        cpc     r25, r23
+        brsh    9f
+        ldd     r18, Y + RAMP_REST
+        sbrc    r18, 0
+        rjmp    8f
+        ldd     r18, Y + RAMP_RUN_PULSES
+        tst     r18
+        breq    5f
+        ldd     r19, Y + RAMP_STEEP
+        sbrs    r19, 1
+        rjmp    6f
+        cpi     r24, ODD_GROUP_LEAST
+        cpc     r25, r1
+        brsh    6f
+5:      lsr     r23
+        ror     r22
+        cp      r24, r22
+        cpc     r25, r23
+        brlo    5b
+        rjmp    9f
+6:      neg     r18             /* whole runs as before */
+        and     r18, r24
+        mov     r19, r18
+        or      r19, r25
+        breq    7f
+        mov     r24, r18
+        rjmp    8f
+7:      ldi     r18, 1
+        std     Y + RAMP_REST, r18
+8:      movw    r22, r24
+9:      movw    r8, r22
+        ret
