@@ -17,6 +17,8 @@
 #define RAMP_STEP 6
 #define RAMP_LIMIT 10
 #define RAMP_RATE 18
+#define RAMP_K2 22
+#define RAMP_K_LACKS 30
 #define RAMP_CYCLES_LOG2 31
 #define RAMP_SPLIT_TICKS 32
 #define RAMP_LEAST_RUN 33
@@ -30,12 +32,20 @@
 #define RAMP_RUN_PULSES 55
 #define RAMP_TICKS 56
 
+#define CONSTANTS_STEPS_PER_REV 12
+#define CONSTANTS_CYCLES_LOG2 14
+#define CONSTANTS_SPLIT_TICKS 15
+
 #define RAMP_TIME_SIZE 6 /* of ramp_time_t, the lower bytes of an interval in 1/65536 */
 
 /* ramp_t.rate has 40 bits behind the point in a harmonic ramp. In a linear one it has so many; half of its product with
  * an interval is shifted to 40. */
 #define LINEAR_RATE_LOG2 48
 #define LINEAR_RATE_SHIFT (40 + 16 - LINEAR_RATE_LOG2 - 1)
+
+/* Of velocity units squared, a pulse, for a hundredth of rad/s^2, times steps_per_rev: 360,000 / pi * 2^15. */
+#define LINEAR_SQUARE_Q15 3754936206
+#define LINEAR_STEEP_LOG2 (LINEAR_RATE_LOG2 + 2 - 28) /* first intervals below 2^14 ticks: 4 K^2 / c below 2^28 */
 
 #define GROUP_MAX_LOG2 9
 #define ODD_GROUP_LEAST 16 /* pulses of a group that are not a power of two */

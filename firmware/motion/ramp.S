@@ -1,4 +1,4 @@
-/* ramp_next() of ramp.h for the AVR. The C version in ramp.c, where the reasons are, is what runs on the host. */
+/* ramp_begin() and ramp_next() of ramp.h for the AVR. The C version in ramp.c, where the reasons are, is what runs on the host. */
 #include "base/registers.h"
 #include "motion/group_layout.h"
 
@@ -26,9 +26,7 @@ again:  ldd     r24, Y + RAMP_LINEAR
         rjmp    linear
         ldi     r22, RAMP_LIMIT
         rcall   copy_member
-        movw    r22, r16
-        movw    r24, r28
-        call    set_ticks
+        rcall   set_ticks
         rcall   choose_group_of_left
 
 /* Intervals that are equal. */
@@ -39,11 +37,11 @@ bounded:
         std     Y + RAMP_REST, r1
         rjmp    leave
 
-/* r4-r7: v, in units at which x and c are as fine as they can be */
-linear: movw    r24, r28
-        call    choose_units
+linear: rcall   choose_units
         rcall   choose_group_of_left
         rcall   load_v
+        movw    r4, r22
+        movw    r6, r24
         ldd     r20, Y + RAMP_FASTER
         rcall   change_square
         sec                     /* roots are rounded down */
@@ -51,15 +49,9 @@ linear: movw    r24, r28
 
 /* r2, r3: pulses left, or to the limit; r4-r7: v at the first pulse */
 harmonic:
-        ldd     r22, Y + RAMP_V
-        ldd     r23, Y + RAMP_V + 1
-        ldd     r24, Y + RAMP_V + 2
-        ldd     r25, Y + RAMP_V + 3
-        ldd     r18, Y + RAMP_LIMIT
-        ldd     r19, Y + RAMP_LIMIT + 1
-        ldd     r20, Y + RAMP_LIMIT + 2
-        ldd     r21, Y + RAMP_LIMIT + 3
         movw    r2, r10
+        rcall   load_v
+        rcall   load_cap
         std     Y + RAMP_BOUNDED, r1
         cp      r18, r22
         cpc     r19, r23
@@ -87,6 +79,8 @@ harmonic:
 1:      movw    r24, r2
         rcall   choose_group
         rcall   load_v
+        movw    r4, r22
+        movw    r6, r24
         rcall   load_step
         ldd     r0, Y + RAMP_FASTER
         sbrc    r0, 0
@@ -108,12 +102,11 @@ harmonic:
         ldd     r0, Y + RAMP_BOUNDED
         sbrs    r0, 0
         rjmp    3f
-        ldd     r4, Y + RAMP_LIMIT
-        ldd     r5, Y + RAMP_LIMIT + 1
-        ldd     r6, Y + RAMP_LIMIT + 2
-        ldd     r7, Y + RAMP_LIMIT + 3
-        movw    r22, r4
-        movw    r24, r6
+        rcall   load_cap
+        movw    r4, r18
+        movw    r6, r20
+        movw    r22, r18
+        movw    r24, r20
         rjmp    4f
 3:      sub     r22, r18        /* velocities are those of pulses */
         sbc     r23, r19
@@ -126,11 +119,7 @@ mean:   adc     r22, r4
         adc     r23, r5
         adc     r24, r6
         adc     r25, r7
-        movw    r18, r22
-        movw    r20, r24
-        movw    r22, r16
-        movw    r24, r28
-        call    ramp_set_interval
+        rcall   set_interval
         ldd     r24, Y + RAMP_BOUNDED
         sbrc    r24, 0
         rjmp    bounded
@@ -200,14 +189,13 @@ beyond: ldi     r24, 1
 
 /* r20: whether v^2 grows by the change of all pulses, or shrinks by it; v follows, returned in r22-r25. The sum is lost. */
 change_square:
-        push    r20
+        mov     r2, r20
         ldi     r22, RAMP_C
         rcall   copy_member
         rcall   times_pulses
-        pop     r20
+        mov     r20, r2
         movw    r22, r16
-        movw    r24, r28
-        adiw    r24, RAMP_X
+        rcall   x_address
         call    wide_change
         ldd     r18, Y + RAMP_X + 7
         clr     r22
@@ -215,8 +203,8 @@ change_square:
         movw    r24, r22
         sbrc    r18, 7
         rjmp    store_v
-        movw    r24, r28
-        adiw    r24, RAMP_X
+set_v:                          /* the root of x */
+        rcall   x_address
         call    wide_root
 store_v:
         std     Y + RAMP_V, r22
@@ -226,10 +214,17 @@ store_v:
         ret
 
 load_v:
-        ldd     r4, Y + RAMP_V
-        ldd     r5, Y + RAMP_V + 1
-        ldd     r6, Y + RAMP_V + 2
-        ldd     r7, Y + RAMP_V + 3
+        ldd     r22, Y + RAMP_V
+        ldd     r23, Y + RAMP_V + 1
+        ldd     r24, Y + RAMP_V + 2
+        ldd     r25, Y + RAMP_V + 3
+        ret
+
+load_cap:
+        ldd     r18, Y + RAMP_LIMIT
+        ldd     r19, Y + RAMP_LIMIT + 1
+        ldd     r20, Y + RAMP_LIMIT + 2
+        ldd     r21, Y + RAMP_LIMIT + 3
         ret
 
 load_step:
@@ -237,6 +232,16 @@ load_step:
         ldd     r19, Y + RAMP_STEP + 1
         ldd     r20, Y + RAMP_STEP + 2
         ldd     r21, Y + RAMP_STEP + 3
+        ret
+
+x_address:
+        movw    r24, r28
+        adiw    r24, RAMP_X
+        ret
+
+c_address:
+        movw    r24, r28
+        adiw    r24, RAMP_C
         ret
 
 /* The sum becomes the ramp's number at r22. */
@@ -415,3 +420,340 @@ choose_group:
 8:      movw    r22, r24
 9:      movw    r8, r22
         ret
+
+/* The sum becomes 2 K / v2, v2 in r22-r25. r4-r7: v2. */
+set_interval:
+        movw    r4, r22
+        movw    r6, r24
+        ldi     r22, RAMP_K2
+        rcall   copy_member
+        movw    r20, r4
+        movw    r22, r6
+        movw    r24, r16
+        call    wide_divide
+        ldd     r22, Y + RAMP_K_LACKS
+        neg     r22
+        movw    r24, r16
+        call    wide_shift
+
+/* By this interval, the sum, the next group is chosen. */
+set_ticks:
+        movw    r30, r16
+        ldd     r24, Z + 2
+        ldd     r25, Z + 3
+        ldd     r18, Z + 4
+        ldd     r19, Z + 5
+        or      r18, r19
+        breq    1f
+        ldi     r24, 0xFF
+        ldi     r25, 0xFF
+1:      std     Y + RAMP_TICKS, r24
+        std     Y + RAMP_TICKS + 1, r25
+        ret
+
+/* x and c as fine as they can be. r2: by how many doublings velocity units grow. */
+choose_units:
+        rcall   x_address
+        call    wide_bits
+        mov     r2, r24
+        rcall   c_address
+        call    wide_bits
+        cp      r24, r2
+        brsh    1f
+        mov     r24, r2
+1:      subi    r24, 59
+        brpl    2f
+        inc     r24             /* half of it, towards zero */
+2:      asr     r24
+        mov     r2, r24
+        breq    3f
+        rcall   scale_k
+        lsl     r2
+        mov     r22, r2
+        rcall   x_address
+        call    wide_shift
+        mov     r22, r2
+        rcall   c_address
+        call    wide_shift
+        rjmp    set_v
+
+/* K in velocity units that are r2 doublings larger, as far as it has room. r3: what it lacks; r4, r5: its address. */
+scale_k:
+        ldd     r3, Y + RAMP_K_LACKS
+        sub     r3, r2
+        movw    r4, r28
+        ldi     r24, RAMP_K2
+        add     r4, r24
+        adc     r5, r1
+        rcall   shift_up
+        std     Y + RAMP_K_LACKS, r3
+3:      ret
+
+/* The number at r4, r5 by r3 doublings, or as many as it has room for; the others stay in r3. */
+shift_up:
+        movw    r24, r4
+        call    wide_bits
+        subi    r24, 64
+        mov     r22, r3
+        neg     r22
+        cp      r22, r24
+        brge    1f
+        mov     r22, r24
+1:      add     r3, r22
+        movw    r24, r4
+        jmp     wide_shift
+
+/* ramp_begin() of ramp.h. r2: by how many doublings velocity units grow; r6, r7, r14, r15: v_most, then a divisor; r8, r9:
+ * the constants; r10-r13: pulses; Y and r16, r17 as above. */
+        .global ramp_begin
+        .type ramp_begin, @function
+ramp_begin:                     /* r24 ramp, r22 constants, r18-r21 v_most, r14-r17 pulses */
+        save_registers frame=8
+        movw    r10, r14
+        movw    r12, r16
+        movw    r16, r28
+        subi    r16, lo8(-1)
+        sbci    r17, hi8(-1)
+        movw    r28, r24
+        movw    r8, r22
+        movw    r6, r18
+        movw    r14, r20
+        std     Y + RAMP_REST, r1
+        std     Y + RAMP_BOUNDED, r1
+        std     Y + RAMP_RUN_PULSES, r1
+        std     Y + RAMP_K_LACKS, r1
+        ldi     r24, 1
+        std     Y + RAMP_LEAST_RUN, r24
+        ldi     r24, GROUP_MAX_LOG2
+        std     Y + RAMP_GROUP_LOG2, r24
+        std     Y + RAMP_MOST_LOG2, r24
+        movw    r30, r22
+        ldd     r24, Z + CONSTANTS_CYCLES_LOG2
+        std     Y + RAMP_CYCLES_LOG2, r24
+        ldd     r24, Z + CONSTANTS_SPLIT_TICKS
+        std     Y + RAMP_SPLIT_TICKS, r24
+        movw    r24, r28
+        adiw    r24, RAMP_K2
+        call    wide_copy
+        ldd     r24, Y + RAMP_LINEAR
+        sbrc    r24, 0
+        rjmp    begin_linear
+
+        /* Harmonic. Steep: r4-r7: K / 2^17; a third: 2^18.6 */
+        rcall   load_k
+        ldd     r24, Y + RAMP_CYCLES_LOG2
+        subi    r24, 10
+1:      lsr     r23
+        ror     r22
+        ror     r21
+        ror     r20
+        inc     r24
+        brne    1b
+        movw    r4, r20
+        movw    r6, r22
+        rcall   load_step
+        ldi     r26, 3
+        ldi     r27, 0
+        call    __muluhisi3     /* r22-r25; leaves r18-r21 alone */
+        ldi     r26, 0
+        cp      r4, r18
+        cpc     r5, r19
+        cpc     r6, r20
+        cpc     r7, r21
+        adc     r26, r1
+        cp      r4, r22
+        cpc     r5, r23
+        cpc     r6, r24
+        cpc     r7, r25
+        adc     r26, r1
+        std     Y + RAMP_STEEP, r26
+        lsl     r18
+        rol     r19
+        rol     r20
+        rol     r21
+        std     Y + RAMP_X, r1
+        std     Y + RAMP_X + 1, r1
+        std     Y + RAMP_X + 2, r1
+        std     Y + RAMP_X + 3, r1
+        std     Y + RAMP_X + 4, r18
+        std     Y + RAMP_X + 5, r19
+        std     Y + RAMP_X + 6, r20
+        std     Y + RAMP_X + 7, r21
+        rcall   load_k
+        rcall   x_address
+        call    wide_divide
+        rcall   set_rate
+        cpi     r24, 33
+        brlo    2f
+        ldi     r18, 0xFF
+        ldi     r19, 0xFF
+        movw    r20, r18
+        rcall   store_rate
+2:      rcall   load_v
+        rcall   load_cap
+        cp      r22, r18
+        cpc     r23, r19
+        cpc     r24, r20
+        cpc     r25, r21
+        brlo    3f
+        movw    r22, r18
+        movw    r24, r20
+3:      rcall   twice
+        rjmp    begun
+
+begin_linear:
+        movw    r20, r6
+        movw    r22, r14
+        rcall   x_address
+        call    wide_set
+        rcall   x_address
+        call    wide_bits
+        subi    r24, 30
+        mov     r2, r24
+        rcall   scale_k
+        rcall   load_v
+        mov     r18, r2
+        rjmp    2f
+1:      rcall   twice
+        inc     r18
+2:      tst     r18
+        brne    1b
+        rcall   store_v
+
+        /* c, first in full steps. r3: by how many doublings smaller than in these units; r4, r5: its address. */
+        mov     r3, r2
+        lsl     r3
+        neg     r3
+        rcall   c_address
+        movw    r4, r24
+        rcall   load_step
+        movw    r22, r20
+        movw    r20, r18
+        or      r18, r19
+        or      r18, r22
+        or      r18, r23
+        breq    3f
+        call    wide_set
+        ldi     r20, lo8(LINEAR_SQUARE_Q15)
+        ldi     r21, hi8(LINEAR_SQUARE_Q15)
+        ldi     r22, hlo8(LINEAR_SQUARE_Q15)
+        ldi     r23, hhi8(LINEAR_SQUARE_Q15)
+        movw    r24, r4
+        call    wide_multiply
+        movw    r30, r8
+        ldd     r6, Z + CONSTANTS_STEPS_PER_REV
+        ldd     r7, Z + CONSTANTS_STEPS_PER_REV + 1
+        clr     r14
+        clr     r15
+        ldi     r24, 15
+        sub     r3, r24
+        rjmp    4f
+3:      movw    r20, r6
+        movw    r22, r14
+        call    ramp_square
+        movw    r6, r10
+        movw    r14, r12
+4:      rcall   divide_scaled
+
+        /* The rate. r4, r5: x; r6, r7, r14, r15: K / 128 */
+        movw    r22, r4
+        rcall   x_address
+        movw    r4, r24
+        call    wide_copy
+        rcall   load_k
+        movw    r6, r20
+        movw    r14, r22
+        mov     r3, r2
+        lsl     r3
+        ldi     r24, LINEAR_RATE_LOG2 - 14
+        add     r3, r24
+        rcall   divide_scaled
+        rcall   divide
+        rcall   set_rate
+        ldd     r18, Y + RAMP_CYCLES_LOG2
+        lsl     r18
+        subi    r18, lo8(-(LINEAR_STEEP_LOG2 - 6))
+        ldi     r19, 0
+        cp      r18, r24
+        adc     r19, r1
+        subi    r18, lo8(-6)
+        cp      r18, r24
+        adc     r19, r1
+        std     Y + RAMP_STEEP, r19
+
+        rcall   load_v
+        movw    r20, r22
+        movw    r22, r24
+        rcall   x_address
+        call    ramp_square
+        rcall   load_v
+        ldd     r18, Y + RAMP_FASTER
+        or      r18, r22
+        or      r18, r23
+        or      r18, r24
+        or      r18, r25
+        brne    5f
+        rcall   c_address
+        movw    r22, r24
+        rcall   x_address
+        call    wide_copy
+        movw    r20, r10
+        movw    r22, r12
+        rcall   x_address
+        call    wide_multiply   /* exactly to a standstill */
+        rcall   set_v
+5:      rcall   choose_units
+        rcall   load_v
+        rcall   twice
+        mov     r18, r22
+        or      r18, r23
+        or      r18, r24
+        or      r18, r25
+        brne    begun
+        rcall   c_address
+        call    wide_root
+begun:  rcall   set_interval
+        restore_registers frame=8
+
+twice:  lsl     r22
+        rol     r23
+        rol     r24
+        rol     r25
+        ret
+
+load_k:                         /* K / 128 */
+        movw    r30, r8
+        ldd     r20, Z + 3
+        ldd     r21, Z + 4
+        ldd     r22, Z + 5
+        ldd     r23, Z + 6
+        ret
+
+/* The rate is x, as far as it has room; r24: bits of x. */
+set_rate:
+        rcall   x_address
+        call    wide_bits
+        ldd     r18, Y + RAMP_X
+        ldd     r19, Y + RAMP_X + 1
+        ldd     r20, Y + RAMP_X + 2
+        ldd     r21, Y + RAMP_X + 3
+store_rate:
+        std     Y + RAMP_RATE, r18
+        std     Y + RAMP_RATE + 1, r19
+        std     Y + RAMP_RATE + 2, r20
+        std     Y + RAMP_RATE + 3, r21
+        ret
+
+/* The number at r4, r5, doubled r3 times, by the divisor: of as many bits as there is room for. */
+divide_scaled:
+        rcall   shift_up
+        rcall   divide
+        mov     r22, r3
+        neg     r22
+        movw    r24, r4
+        jmp     wide_shift
+
+divide: movw    r20, r6
+        movw    r22, r14
+        movw    r24, r4
+        jmp     wide_divide

@@ -11,10 +11,6 @@
 #include "motion/group_layout.h"
 #include <string.h>
 
-/* Of velocity units squared, a pulse, for a hundredth of rad/s^2, times steps_per_rev: 360,000 / pi * 2^15. */
-#define LINEAR_SQUARE_Q15 3754936206u
-#define LINEAR_STEEP_LOG2 (LINEAR_RATE_LOG2 + 2u - 28u) /* first intervals below 2^14 ticks: 4 K^2 / c below 2^28 */
-
 void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev, uint32_t clock_hz)
 {
     constants->steps_per_rev = steps_per_rev;
@@ -63,8 +59,16 @@ NOINLINE uint32_t ramp_velocity(const ramp_constants_t *constants, uint32_t tick
     return ((uint32_t)wide_from_byte(&v2_q16, 2) + 1) >> 1;
 }
 
+void ramp_square(wide_t *x, uint32_t v)
+{
+    wide_set(x, v);
+    wide_multiply(x, v);
+}
+
+#if !defined __AVR__ || defined RAMP_IN_C
+
 /* The interval, in 1/65536, to choose the next group by. */
-NOINLINE void set_ticks(ramp_t *ramp, const wide_t *q16)
+static NOINLINE void set_ticks(ramp_t *ramp, const wide_t *q16)
 {
     uint32_t ticks = (uint32_t)wide_from_byte(q16, 2);
     ramp->ticks = ticks > UINT16_MAX ? UINT16_MAX : (uint16_t)ticks;
@@ -82,12 +86,6 @@ static NOINLINE void divide_scaled(wide_t *x, uint32_t divisor, int8_t up)
     wide_shift(x, (int8_t)(before - up));
 }
 
-void ramp_square(wide_t *x, uint32_t v)
-{
-    wide_set(x, v);
-    wide_multiply(x, v);
-}
-
 /* Linear: velocity units so many times twice as large, or half as large (below 0). K gets what it has room for. */
 static NOINLINE void scale_k(ramp_t *ramp, int8_t by)
 {
@@ -103,7 +101,7 @@ static NOINLINE void scale_k(ramp_t *ramp, int8_t by)
 }
 
 /* As fine as they can be. */
-NOINLINE void choose_units(ramp_t *ramp)
+static NOINLINE void choose_units(ramp_t *ramp)
 {
     NEAR(ramp);
     uint8_t bits = wide_bits(&ramp->x);
@@ -159,7 +157,7 @@ static void begin_linear(ramp_t *ramp, const ramp_constants_t *constants, uint32
 }
 
 /* 2 K / v2 */
-NOINLINE void ramp_set_interval(ramp_t *ramp, wide_t *interval_q16, uint32_t v2)
+static NOINLINE void set_interval(ramp_t *ramp, wide_t *interval_q16, uint32_t v2)
 {
     NEAR(ramp);
     divide_k(interval_q16, &ramp->k2_q16, v2);
@@ -197,10 +195,8 @@ NOINLINE void ramp_begin(ramp_t *ramp, const ramp_constants_t *constants, uint32
         first2 = 2 * (ramp->v < ramp->limit.cap ? ramp->v : ramp->limit.cap);
     }
     wide_t interval_q16;
-    ramp_set_interval(ramp, &interval_q16, first2);
+    set_interval(ramp, &interval_q16, first2);
 }
-
-#if !defined __AVR__ || defined RAMP_IN_C
 
 /* -- groups ------------------------------------------------------------------------------------------------------ */
 
@@ -288,7 +284,7 @@ static uint16_t harmonic_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16)
     uint32_t change = step * pulses;
     uint32_t v_end = v + change;
     ramp->v = v_end;
-    ramp_set_interval(ramp, interval_q16, ramp->bounded ? 2 * cap : v + v_end - step);
+    set_interval(ramp, interval_q16, ramp->bounded ? 2 * cap : v + v_end - step);
     return pulses;
 }
 
@@ -302,7 +298,7 @@ static uint16_t linear_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16, w
     wide_change(&ramp->x, change, ramp->faster);
     uint32_t v = ramp->v;
     ramp->v = wide_is_negative(&ramp->x) ? 0 : wide_root(&ramp->x);
-    ramp_set_interval(ramp, interval_q16, v + ramp->v + 1); /* roots are rounded down */
+    set_interval(ramp, interval_q16, v + ramp->v + 1); /* roots are rounded down */
     return pulses;
 }
 

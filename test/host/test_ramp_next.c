@@ -10,9 +10,6 @@
 #define ramp_interval interval_in_c
 #define ramp_velocity velocity_in_c
 #define ramp_square square_in_c
-#define set_ticks set_ticks_in_c
-#define choose_units choose_units_in_c
-#define ramp_set_interval set_interval_in_c
 #define ramp_begin begin_in_c
 #define ramp_next next_in_c
 #include "motion/ramp.c"
