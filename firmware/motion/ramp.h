@@ -8,7 +8,9 @@
  * Units:   ticks of the timer's clock (62.5 ns, or the external one's) with a fraction in 1/65536. Velocities in "units" =
  *          RPM * 100 * microstep factor, so that a ramp value in hundredths is the change per pulse whatever the factor, and
  *          interval = K / v.
- * Context: main loop only; no hardware. Tests: test/host/test_ramp.c, test/avr/.
+ * Context: main loop only; no hardware. ramp_begin() and ramp_next() are in assembler on the AVR (ramp.S, cycles there),
+ *          elsewhere in ramp.c; the same to the bit.
+ * Tests:   test/host/test_ramp.c, test_ramp_next.c, the same cases on the AVR.
  * Errors:  none; what is asked for has been checked (profile_check).
  * Limits:  steps_per_rev * slow_rpm >= 58 and steps_per_rev >= 8 (first intervals below about one second).
  */

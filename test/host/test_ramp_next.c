@@ -147,7 +147,7 @@ static void choose_constants(void)
 /* A ramp as profile_begin_ramp() has them, and others: v_most and pulses for ramp_begin(). */
 static void choose_law(uint32_t *v_most, uint32_t *pulses)
 {
-    memset(&ramp, 0, sizeof ramp);
+    memset(&ramp, 0xA5, sizeof ramp); /* what the last one left */
     ramp.linear = !one_in(2);
     ramp.faster = !one_in(2);
     *v_most = value_between(10, 27);
@@ -163,9 +163,8 @@ static void choose_law(uint32_t *v_most, uint32_t *pulses)
         }
         return;
     }
-    if (one_in(2))
-        ramp.v = value_between(7, 20);
-    if (ramp.v > *v_most || !ramp.faster)
+    ramp.v = value_between(7, 20);
+    if (ramp.v > *v_most || !ramp.faster || one_in(2))
         ramp.v = 0;
     ramp.step = one_in(4) ? 0 : value_between(1, 23);
     if (ramp.faster)
