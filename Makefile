@@ -221,7 +221,7 @@ TIMED := main terminal_poll terminal_port_get terminal_port_put line_take comman
     note_begun pulses_left pulses_in_gear pulses_of_phase add_pulses ops_poll \
     set_interval cruise_next append append_run block_append push \
     get begin_ring drop_emission direction_flags signed_pulses make_ready profile_interval engine_check \
-    execute_read fill set_silence emit_phase emit choose_group
+    execute_read fill set_silence emit_phase emit
 $(OUTLINE): tools/outline.py $(BUILD)/firmware/flags
 	@mkdir -p $(@D)
 	@echo '#!/bin/sh' >$@

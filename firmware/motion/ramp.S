@@ -127,14 +127,13 @@ mean:   adc     r22, r4
         movw    r24, r16
         adiw    r24, GROUP_END
         movw    r22, r16
-        call    wide_copy
+        call    wide_copy       /* (r22, r23 stay) */
         movw    r30, r14
         std     Z + BLOCK_RUNS, r1
         movw    r24, r8
         sbiw    r24, 2
         brlo    1f
         movw    r24, r28
-        movw    r22, r16
         movw    r20, r14
         movw    r18, r8
         call    group_plan
@@ -198,12 +197,6 @@ change_square:
         movw    r22, r16
         rcall   x_address
         call    wide_change
-        ldd     r18, Y + RAMP_X + 7
-        clr     r22
-        clr     r23
-        movw    r24, r22
-        sbrc    r18, 7
-        rjmp    store_v
 set_v:                          /* the root of x */
         rcall   x_address
         call    wide_root
@@ -255,10 +248,10 @@ copy_member:
 
 /* The sum, by the pulses. */
 times_pulses:
+        movw    r24, r16
         movw    r20, r8
         clr     r22
         clr     r23
-        movw    r24, r16
         jmp     wide_multiply
 
 /* r8, r9: how many pulses the next group has, of those left, or of r24, r25. r2: the most doublings of a pulse, r3: so many;
@@ -419,16 +412,15 @@ choose_group:
 9:      movw    r8, r22
         ret
 
-/* The sum becomes 2 K / v2, v2 in r22-r25. r4-r7: v2. */
+/* The sum becomes 2 K / v2, v2 in r22-r25. */
 set_interval:
-        movw    r4, r22
-        movw    r6, r24
-        ldi     r22, RAMP_K2
-        rcall   copy_member
-        movw    r20, r4
-        movw    r22, r6
+        movw    r18, r22
+        movw    r20, r24
+        movw    r22, r28
+        subi    r22, lo8(-(RAMP_K2))
+        sbci    r23, hi8(-(RAMP_K2))
         movw    r24, r16
-        call    wide_divide
+        rcall   ramp_divide_k
         ldd     r22, Y + RAMP_K_LACKS
         neg     r22
         movw    r24, r16
@@ -500,6 +492,30 @@ shift_up:
 1:      add     r3, r22
         movw    r24, r4
         jmp     wide_shift
+
+        .global ramp_interval_q16
+        .type ramp_interval_q16, @function
+ramp_interval_q16:              /* r24 q16, r22 constants, r18-r21 v */
+        lsl     r18
+        rol     r19
+        rol     r20
+        rol     r21
+        .global ramp_divide_k
+        .type ramp_divide_k, @function
+ramp_divide_k:                  /* r24 quotient, r22 k2_q16, r18-r21 divisor */
+        push    r18
+        push    r19
+        call    wide_copy
+        movw    r22, r20
+        pop     r21
+        pop     r20
+        jmp     wide_divide
+
+        .global ramp_square
+        .type ramp_square, @function
+ramp_square:                    /* r24 x, r20-r23 v */
+        call    wide_set
+        jmp     wide_multiply
 
 /* ramp_begin() of ramp.h. r2: by how many doublings velocity units grow; r6, r7, r14, r15: v_most, then a divisor; r8, r9:
  * the constants; r10-r13: pulses; Y and r16, r17 as above. */
@@ -603,7 +619,6 @@ begin_linear:
         movw    r22, r14
         rcall   x_address
         call    wide_set
-        rcall   x_address
         call    wide_bits
         subi    r24, 30
         mov     r2, r24
@@ -647,7 +662,7 @@ begin_linear:
         rjmp    4f
 3:      movw    r20, r6
         movw    r22, r14
-        call    ramp_square
+        rcall   ramp_square
         movw    r6, r10
         movw    r14, r12
 4:      rcall   divide_scaled
@@ -682,7 +697,7 @@ begin_linear:
         movw    r20, r22
         movw    r22, r24
         rcall   x_address
-        call    ramp_square
+        rcall   ramp_square
         rcall   load_v
         ldd     r18, Y + RAMP_FASTER
         or      r18, r22
@@ -696,7 +711,6 @@ begin_linear:
         call    wide_copy
         movw    r20, r10
         movw    r22, r12
-        rcall   x_address
         call    wide_multiply   /* exactly to a standstill */
         rcall   set_v
 5:      rcall   choose_units

@@ -25,11 +25,8 @@ void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev, uint32_
     constants->split_ticks = log2 ? 0 : BLOCK_SPLIT_TICKS;
 }
 
-static NOINLINE void divide_k(wide_t *quotient, const wide_t *k2_q16, uint32_t divisor)
-{
-    wide_copy(quotient, k2_q16);
-    wide_divide(quotient, divisor);
-}
+/* quotient = k2_q16 / divisor */
+void ramp_divide_k(wide_t *quotient, const wide_t *k2_q16, uint32_t divisor);
 
 /* Of ticks in 1/65536. */
 static void set_time(ramp_time_t *time, const wide_t *q16)
@@ -38,25 +35,17 @@ static void set_time(ramp_time_t *time, const wide_t *q16)
     time->frac_q16 = (uint16_t)*q16;
 }
 
-NOINLINE void ramp_interval_q16(wide_t *q16, const ramp_constants_t *constants, uint32_t v)
+#if !defined __AVR__ || defined RAMP_IN_C
+
+void ramp_divide_k(wide_t *quotient, const wide_t *k2_q16, uint32_t divisor)
 {
-    divide_k(q16, &constants->k2_q16, 2 * v);
+    wide_copy(quotient, k2_q16);
+    wide_divide(quotient, divisor);
 }
 
-ramp_time_t ramp_interval(const ramp_constants_t *constants, uint32_t v)
+void ramp_interval_q16(wide_t *q16, const ramp_constants_t *constants, uint32_t v)
 {
-    wide_t q16;
-    ramp_interval_q16(&q16, constants, v);
-    ramp_time_t time;
-    set_time(&time, &q16);
-    return time;
-}
-
-NOINLINE uint32_t ramp_velocity(const ramp_constants_t *constants, uint32_t ticks)
-{
-    wide_t v2_q16;
-    divide_k(&v2_q16, &constants->k2_q16, ticks);
-    return ((uint32_t)wide_from_byte(&v2_q16, 2) + 1) >> 1;
+    ramp_divide_k(q16, &constants->k2_q16, 2 * v);
 }
 
 void ramp_square(wide_t *x, uint32_t v)
@@ -64,8 +53,6 @@ void ramp_square(wide_t *x, uint32_t v)
     wide_set(x, v);
     wide_multiply(x, v);
 }
-
-#if !defined __AVR__ || defined RAMP_IN_C
 
 /* The interval, in 1/65536, to choose the next group by. */
 static NOINLINE void set_ticks(ramp_t *ramp, const wide_t *q16)
@@ -160,7 +147,7 @@ static void begin_linear(ramp_t *ramp, const ramp_constants_t *constants, uint32
 static NOINLINE void set_interval(ramp_t *ramp, wide_t *interval_q16, uint32_t v2)
 {
     NEAR(ramp);
-    divide_k(interval_q16, &ramp->k2_q16, v2);
+    ramp_divide_k(interval_q16, &ramp->k2_q16, v2);
     wide_shift(interval_q16, (int8_t)-ramp->k_lacks);
     set_ticks(ramp, interval_q16);
 }
@@ -297,7 +284,7 @@ static uint16_t linear_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16, w
     wide_multiply(change, pulses);
     wide_change(&ramp->x, change, ramp->faster);
     uint32_t v = ramp->v;
-    ramp->v = wide_is_negative(&ramp->x) ? 0 : wide_root(&ramp->x);
+    ramp->v = wide_root(&ramp->x);
     set_interval(ramp, interval_q16, v + ramp->v + 1); /* roots are rounded down */
     return pulses;
 }
@@ -352,3 +339,19 @@ uint16_t ramp_next(ramp_t *ramp, uint16_t left, ramp_time_t *sum, block_t *block
     return pulses;
 }
 #endif
+
+ramp_time_t ramp_interval(const ramp_constants_t *constants, uint32_t v)
+{
+    wide_t q16;
+    ramp_interval_q16(&q16, constants, v);
+    ramp_time_t time;
+    set_time(&time, &q16);
+    return time;
+}
+
+NOINLINE uint32_t ramp_velocity(const ramp_constants_t *constants, uint32_t ticks)
+{
+    wide_t v2_q16;
+    ramp_divide_k(&v2_q16, &constants->k2_q16, ticks);
+    return ((uint32_t)wide_from_byte(&v2_q16, 2) + 1) >> 1;
+}

@@ -10,10 +10,13 @@
 #define ramp_interval interval_in_c
 #define ramp_velocity velocity_in_c
 #define ramp_square square_in_c
+#define ramp_divide_k divide_k_in_c
 #define ramp_begin begin_in_c
 #define ramp_next next_in_c
 #include "motion/ramp.c"
 #undef ramp_constants
+#undef ramp_interval_q16
+#undef ramp_square
 #undef ramp_begin
 #undef ramp_next
 
@@ -154,7 +157,7 @@ static void choose_law(uint32_t *v_most, uint32_t *pulses)
     *pulses = value_between(1, 14);
     if (!ramp.linear) {
         ramp.v = value_between(10, 24);
-        ramp.step = value_between(1, 20);
+        ramp.step = value_between(1, one_in(8) ? 32 : 20);
         ramp.limit.cap = UINT32_MAX >> 1;
         if (!ramp.faster) {
             if (one_in(2))
@@ -217,11 +220,27 @@ static void test_any_ramp_goes_on_as_in_c_to_the_bit(void)
     }
 }
 
+static void test_intervals_and_squares_are_the_same_in_c_to_the_bit(void)
+{
+    for (uint16_t i = 0; i < 1000; i++) {
+        choose_constants();
+        uint32_t v = value_between(1, 31);
+        wide_t x, in_c;
+        ramp_interval_q16(&x, &constants, v);
+        interval_q16_in_c(&in_c, &constants, v);
+        TEST_ASSERT_TRUE(x == in_c);
+        ramp_square(&x, v);
+        square_in_c(&in_c, v);
+        TEST_ASSERT_TRUE(x == in_c);
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_any_group_is_the_same_in_c_to_the_bit);
     RUN_TEST(test_any_ramp_begins_as_in_c_to_the_bit);
     RUN_TEST(test_any_ramp_goes_on_as_in_c_to_the_bit);
+    RUN_TEST(test_intervals_and_squares_are_the_same_in_c_to_the_bit);
     return UNITY_END();
 }
