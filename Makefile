@@ -43,6 +43,7 @@ FIRMWARE_SRCS := \
     firmware/hal/usart_isr.S \
     firmware/hal/soft_uart_isr.S \
     firmware/motion/ramp.c \
+    firmware/motion/ramp.S \
     firmware/motion/group.c \
     firmware/motion/group.S \
     firmware/motion/block.c \
@@ -88,7 +89,7 @@ FIRMWARE_SRCS := \
 
 HOST_TESTS := test_number test_status test_baud test_line test_settings test_store test_session test_queue \
     test_encoder test_ops test_motion_syntax test_commands test_configure test_display test_trial test_terminal test_packet test_network \
-    test_bus_nodes test_fuzz test_boot test_drivers test_wide test_block test_group test_ramp test_profile test_engine \
+    test_bus_nodes test_fuzz test_boot test_drivers test_wide test_block test_group test_ramp test_ramp_next test_profile test_engine \
     test_property_planner test_processor_model
 FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 STORE_SRCS := firmware/eeprom/store.c firmware/base/crc16.c firmware/settings.c test/host/fakes/eeprom_port_fake.c
@@ -124,8 +125,9 @@ test_drivers_SRCS := firmware/drivers.c
 test_wide_SRCS := firmware/base/wide.S
 test_block_SRCS := firmware/motion/block.c firmware/motion/block.S firmware/hal/step_hurry.S
 test_group_SRCS := firmware/motion/group.c firmware/motion/group.S firmware/base/wide.S
-RAMP_SRCS := firmware/motion/ramp.c firmware/motion/group.c firmware/motion/group.S firmware/base/wide.S
+RAMP_SRCS := firmware/motion/ramp.c firmware/motion/ramp.S firmware/motion/group.c firmware/motion/group.S firmware/base/wide.S
 test_ramp_SRCS := $(RAMP_SRCS)
+test_ramp_next_SRCS := $(RAMP_SRCS)
 test_ramp_HOST_SRCS := test/host/motion_exact.c
 test_profile_SRCS := firmware/motion/profile.c $(RAMP_SRCS)
 ENGINE_SRCS := firmware/drivers.c firmware/motion/engine.c firmware/motion/block.c firmware/motion/profile.c $(RAMP_SRCS) firmware/settings.c \
@@ -135,7 +137,7 @@ test_processor_model_SRCS := test/image/processor_model.c
 test_property_planner_SRCS := $(ENGINE_SRCS) test/host/motion_exact.c
 
 # Arithmetic that is tested on the AVR as well: the same source, compiled by avr-gcc, run on the simulated board.
-AVR_TESTS := test_number test_line test_session test_wide test_block test_group test_ramp test_profile
+AVR_TESTS := test_number test_line test_session test_wide test_block test_group test_ramp test_ramp_next test_profile
 
 # Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
 IMAGE_TESTS := test_image_boot test_image_pins test_image_encoder test_image_motion test_image_queue \
@@ -227,7 +229,7 @@ TIMED := main terminal_poll terminal_port_get terminal_port_put line_take comman
     note_begun pulses_left pulses_in_gear pulses_of_phase add_pulses ops_poll \
     set_interval cruise_next append append_run block_append push \
     get begin_ring drop_emission direction_flags signed_pulses make_ready profile_interval engine_check \
-    execute_read fill set_silence emit_phase emit choose_group
+    execute_read fill set_silence emit_phase emit
 $(OUTLINE): tools/outline.py $(BUILD)/firmware/flags
 	@mkdir -p $(@D)
 	@echo '#!/bin/sh' >$@

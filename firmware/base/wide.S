@@ -1,5 +1,6 @@
 /* See wide.h. Cycles with call and return: add, subtract 96; multiply 300; set 25; divide about 140 per byte of the quotient;
- * root 1,200; shift 50 and 11 a bit; copy 80; fraction 65. Little-endian, arguments by the avr-gcc calling convention. */
+ * root 1,200; shift 50 and 11 a bit; copy 80; fraction 65. Little-endian, arguments by the avr-gcc calling convention; wide_set and
+ * wide_copy leave r20 to r25 as they are. */
 
         .section .text.wide_copy, "ax", @progbits
         .global wide_copy
@@ -177,7 +178,8 @@ wide_root:                      /* r24 x; returns r22-r25 */
         push    r16
         push    r17
         movw    r30, r24
-        adiw    r30, 8
+        adiw    r30, 7
+        ld      r0, Z+
         clr     r17
         clr     r18
         clr     r19
@@ -185,6 +187,8 @@ wide_root:                      /* r24 x; returns r22-r25 */
         movw    r22, r18
         movw    r24, r18
         clr     r26
+        sbrc    r0, 7
+        rjmp    4f              /* below 0 */
         ldi     r27, 8          /* bytes */
 1:      ld      r0, -Z
         ldi     r16, 4          /* pairs of bits */
@@ -229,7 +233,7 @@ wide_root:                      /* r24 x; returns r22-r25 */
         ror     r24
         ror     r23
         ror     r22
-        pop     r17
+4:      pop     r17
         pop     r16
         ret
 

@@ -18,7 +18,7 @@ void wide_subtract(wide_t *difference, const wide_t *x); /* difference -= x */
 void wide_change(wide_t *x, const wide_t *change, bool add); /* x += change or x -= change */
 void wide_multiply(wide_t *x, uint32_t factor);    /* x *= factor */
 uint32_t wide_divide(wide_t *x, uint32_t divisor); /* x /= divisor, truncated; returns the remainder. divisor >= 1 */
-uint32_t wide_root(const wide_t *x);               /* sqrt(x), truncated */
+uint32_t wide_root(const wide_t *x);               /* sqrt(x), truncated; of a negative x 0 */
 uint8_t wide_bits(const wide_t *x);                /* of x without its leading zeros: 0..64 */
 void wide_shift(wide_t *x, int8_t bits);           /* x >>= bits, without sign; below 0: x <<= -bits; -64 < bits < 64 */
 uint32_t wide_fraction(uint32_t x, uint32_t y_q32); /* x * y / 2^32, less up to 4: products of the low bytes are left out */
@@ -55,7 +55,7 @@ static inline uint32_t wide_divide(wide_t *x, uint32_t divisor)
 }
 static inline uint32_t wide_root(const wide_t *x)
 {
-    uint64_t left = *x;
+    uint64_t left = (int64_t)*x < 0 ? 0 : *x;
     uint64_t root = 0;
     for (uint64_t bit = (uint64_t)1 << 62; bit; bit >>= 2) {
         uint64_t trial = root + bit;

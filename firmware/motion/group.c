@@ -22,17 +22,34 @@ const series_t group_series[] FLASH = {SERIES(2.0), SERIES(3.0), SERIES(4.0),  S
 #define CHECK(name, type, member) _Static_assert(name == offsetof(type, member), "group_layout.h: " #member)
 CHECK(RAMP_LINEAR, ramp_t, linear);
 CHECK(RAMP_FASTER, ramp_t, faster);
+CHECK(RAMP_V, ramp_t, v);
+CHECK(RAMP_STEP, ramp_t, step);
+CHECK(RAMP_LIMIT, ramp_t, limit);
 CHECK(RAMP_RATE, ramp_t, rate);
+CHECK(RAMP_K2, ramp_t, k2_q16);
+CHECK(RAMP_K_LACKS, ramp_t, k_lacks);
 CHECK(RAMP_CYCLES_LOG2, ramp_t, cycles_log2);
 CHECK(RAMP_SPLIT_TICKS, ramp_t, split_ticks);
 CHECK(RAMP_LEAST_RUN, ramp_t, least_run);
+CHECK(RAMP_X, ramp_t, x);
+CHECK(RAMP_C, ramp_t, c);
 CHECK(RAMP_STEEP, ramp_t, steep);
+CHECK(RAMP_BOUNDED, ramp_t, bounded);
 CHECK(RAMP_REST, ramp_t, rest);
+CHECK(RAMP_GROUP_LOG2, ramp_t, group_log2);
+CHECK(RAMP_MOST_LOG2, ramp_t, most_log2);
+CHECK(RAMP_RUN_PULSES, ramp_t, run_pulses);
 CHECK(RAMP_TICKS, ramp_t, ticks);
+CHECK(CONSTANTS_STEPS_PER_REV, ramp_constants_t, steps_per_rev);
+CHECK(CONSTANTS_CYCLES_LOG2, ramp_constants_t, cycles_log2);
+CHECK(CONSTANTS_SPLIT_TICKS, ramp_constants_t, split_ticks);
+_Static_assert(offsetof(ramp_constants_t, k2_q16) == 0, "ramp.S");
 CHECK(GROUP_SUM, group_t, sum_q16);
 CHECK(GROUP_END, group_t, end_q16);
+_Static_assert(GROUP_SIZE == sizeof(group_t) && RAMP_TIME_SIZE == sizeof(ramp_time_t), "group_layout.h: sizes");
 _Static_assert(BLOCK_TOP == 0 && BLOCK_SLOPE == 4 && BLOCK_CURVE == 8 && BLOCK_THIRD == 12 && BLOCK_WIDTH == 14,
                "group.S goes from one to the next");
+_Static_assert(GROUP_MAX_TICKS % 256 == 0 && GROUP_MAX_STEEP_TICKS % 256 == 0, "ramp.S sets their upper bytes alone");
 _Static_assert(LINEAR_RATE_SHIFT == 7 && RUN_MAX_PULSES == 128, "group.S has them in its code");
 #endif
 

@@ -132,11 +132,6 @@ static void add_change(wide_t *v2, const profile_basis_t *basis, uint32_t pulses
     wide_change(v2, &change, add);
 }
 
-static NOINLINE uint32_t root(const wide_t *x)
-{
-    return wide_is_negative(x) ? 0 : wide_root(x);
-}
-
 static NOINLINE uint32_t limited(uint32_t v, const profile_t *profile)
 {
     NEAR(profile);
@@ -161,9 +156,9 @@ static void limit_peak(profile_t *profile, const profile_basis_t *basis)
             v_peak = 0;
         ramp_square(&v2, v_peak);
         add_change(&v2, basis, pulses, profile->accel_centi, faster);
-        v_peak = root(&v2);
+        v_peak = wide_root(&v2);
         add_change(&v2, basis, 1, profile->accel_centi, !faster);
-        v_last = (v_peak + root(&v2)) / 2; /* the mean of its two ends */
+        v_last = (v_peak + wide_root(&v2)) / 2; /* the mean of its two ends */
     } else {
         uint32_t step = faster ? profile->accel_centi : 0u - profile->accel_centi;
         v_peak += step * pulses;

@@ -11,15 +11,6 @@
 #include "motion/group_layout.h"
 #include <string.h>
 
-#define GROUP_MAX_LOG2 9u
-#define ODD_GROUP_LEAST 16u /* pulses of a group that are not a power of two */
-#define REST_PULSES 64u /* the least that is left for a fast ramp's last run */
-#define GROUP_MAX_TICKS 64000u /* below 65,536: intervals that grow are taken for longer than they are ... */
-#define GROUP_MAX_STEEP_TICKS 49152u /* ... by up to a third, in a steep ramp */
-/* Of velocity units squared, a pulse, for a hundredth of rad/s^2, times steps_per_rev: 360,000 / pi * 2^15. */
-#define LINEAR_SQUARE_Q15 3754936206u
-#define LINEAR_STEEP_LOG2 (LINEAR_RATE_LOG2 + 2u - 28u) /* first intervals below 2^14 ticks: 4 K^2 / c below 2^28 */
-
 void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev, uint32_t clock_hz)
 {
     constants->steps_per_rev = steps_per_rev;
@@ -34,11 +25,8 @@ void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev, uint32_
     constants->split_ticks = log2 ? 0 : BLOCK_SPLIT_TICKS;
 }
 
-static NOINLINE void divide_k(wide_t *quotient, const wide_t *k2_q16, uint32_t divisor)
-{
-    wide_copy(quotient, k2_q16);
-    wide_divide(quotient, divisor);
-}
+/* quotient = k2_q16 / divisor */
+void ramp_divide_k(wide_t *quotient, const wide_t *k2_q16, uint32_t divisor);
 
 /* Of ticks in 1/65536. */
 static void set_time(ramp_time_t *time, const wide_t *q16)
@@ -47,25 +35,23 @@ static void set_time(ramp_time_t *time, const wide_t *q16)
     time->frac_q16 = (uint16_t)*q16;
 }
 
-NOINLINE void ramp_interval_q16(wide_t *q16, const ramp_constants_t *constants, uint32_t v)
+#if !defined __AVR__ || defined RAMP_IN_C
+
+void ramp_divide_k(wide_t *quotient, const wide_t *k2_q16, uint32_t divisor)
 {
-    divide_k(q16, &constants->k2_q16, 2 * v);
+    wide_copy(quotient, k2_q16);
+    wide_divide(quotient, divisor);
 }
 
-ramp_time_t ramp_interval(const ramp_constants_t *constants, uint32_t v)
+void ramp_interval_q16(wide_t *q16, const ramp_constants_t *constants, uint32_t v)
 {
-    wide_t q16;
-    ramp_interval_q16(&q16, constants, v);
-    ramp_time_t time;
-    set_time(&time, &q16);
-    return time;
+    ramp_divide_k(q16, &constants->k2_q16, 2 * v);
 }
 
-NOINLINE uint32_t ramp_velocity(const ramp_constants_t *constants, uint32_t ticks)
+void ramp_square(wide_t *x, uint32_t v)
 {
-    wide_t v2_q16;
-    divide_k(&v2_q16, &constants->k2_q16, ticks);
-    return ((uint32_t)wide_from_byte(&v2_q16, 2) + 1) >> 1;
+    wide_set(x, v);
+    wide_multiply(x, v);
 }
 
 /* The interval, in 1/65536, to choose the next group by. */
@@ -73,73 +59,6 @@ static NOINLINE void set_ticks(ramp_t *ramp, const wide_t *q16)
 {
     uint32_t ticks = (uint32_t)wide_from_byte(q16, 2);
     ramp->ticks = ticks > UINT16_MAX ? UINT16_MAX : (uint16_t)ticks;
-}
-
-/* -- groups ------------------------------------------------------------------------------------------------------ */
-
-/* By what part of its value, a power of two, the law's variable may change in a group. The parabola is off by no more than
- * 1/32 of the cube of that, of the interval: a 16,000th, or at less than 128 ticks a 2,000th. Steep ramps need groups that
- * last as long as it takes to plan them. */
-static uint8_t part_log2(const ramp_t *ramp)
-{
-    return ramp->steep > 1 ? 1 : ramp->ticks < 128 ? 2 : 3;
-}
-
-/* How many pulses the next group has: a power of two whose change of the law's variable, of so much a pulse, and duration
- * are within the limits; where fewer are left, so many whole runs as before. Down from twice the last group's size, which is
- * nearly always enough. */
-static NOINLINE uint16_t choose_group(ramp_t *ramp, uint16_t left)
-{
-    NEAR(ramp);
-    uint16_t ticks = ramp->ticks;
-    ramp->rest = false;
-    if (ticks < ramp->split_ticks) {
-        /* Where a few pulses could not be reloaded in time, the last run is of many. */
-        if (left < 2 * REST_PULSES)
-            ramp->rest = true;
-        else
-            left = (uint16_t)(left - REST_PULSES);
-    }
-    uint8_t log2 = ramp->group_log2;
-    ramp->group_log2 = 0;
-    if (ticks > GROUP_MAX_TICKS / 2)
-        return 1; /* often, near a standstill */
-    uint32_t change = ramp->step;
-    uint32_t most_change = ramp->v;
-    if (ramp->linear) {
-        change = wide_half(&ramp->c, 1);
-        most_change = 2 * wide_half(&ramp->x, 1);
-    }
-    if (ramp->bounded)
-        change = 0;
-    uint8_t part = part_log2(ramp);
-    most_change >>= part;
-    if (!ramp->faster) {
-        ticks = (uint16_t)(ticks + (ticks >> part)); /* they grow, and the variable shrinks */
-        most_change -= most_change >> 2;
-    }
-    if (++log2 > ramp->most_log2)
-        log2 = ramp->most_log2;
-    uint16_t most_ticks = ramp->steep > 1 ? GROUP_MAX_STEEP_TICKS : GROUP_MAX_TICKS;
-    while (log2 && (ticks > most_ticks >> log2 || change > most_change >> log2))
-        log2--;
-    uint16_t pulses = (uint16_t)(1u << log2);
-    ramp->group_log2 = log2;
-    if (ramp->rest && left <= pulses)
-        return left;
-    if (left >= pulses)
-        return pulses;
-    if (ramp->run_pulses == 0 || (ramp->steep > 1 && left < ODD_GROUP_LEAST)) {
-        while (pulses > left)
-            pulses >>= 1;
-        return pulses;
-    }
-    uint16_t odd = (uint16_t)(left & (ramp->run_pulses - 1u));
-    if (odd == left)
-        ramp->rest = true;
-    else
-        left = (uint16_t)(left - odd);
-    return left;
 }
 
 /* -- the laws ----------------------------------------------------------------------------------------------------- */
@@ -152,12 +71,6 @@ static NOINLINE void divide_scaled(wide_t *x, uint32_t divisor, int8_t up)
     wide_shift(x, (int8_t)-before);
     wide_divide(x, divisor);
     wide_shift(x, (int8_t)(before - up));
-}
-
-void ramp_square(wide_t *x, uint32_t v)
-{
-    wide_set(x, v);
-    wide_multiply(x, v);
 }
 
 /* Linear: velocity units so many times twice as large, or half as large (below 0). K gets what it has room for. */
@@ -234,7 +147,7 @@ static void begin_linear(ramp_t *ramp, const ramp_constants_t *constants, uint32
 static NOINLINE void set_interval(ramp_t *ramp, wide_t *interval_q16, uint32_t v2)
 {
     NEAR(ramp);
-    divide_k(interval_q16, &ramp->k2_q16, v2);
+    ramp_divide_k(interval_q16, &ramp->k2_q16, v2);
     wide_shift(interval_q16, (int8_t)-ramp->k_lacks);
     set_ticks(ramp, interval_q16);
 }
@@ -272,6 +185,73 @@ NOINLINE void ramp_begin(ramp_t *ramp, const ramp_constants_t *constants, uint32
     set_interval(ramp, &interval_q16, first2);
 }
 
+/* -- groups ------------------------------------------------------------------------------------------------------ */
+
+/* By what part of its value, a power of two, the law's variable may change in a group. The parabola is off by no more than
+ * 1/32 of the cube of that, of the interval: a 16,000th, or at less than 128 ticks a 2,000th. Steep ramps need groups that
+ * last as long as it takes to plan them. */
+static uint8_t part_log2(const ramp_t *ramp)
+{
+    return ramp->steep > 1 ? 1 : ramp->ticks < 128 ? 2 : 3;
+}
+
+/* How many pulses the next group has: a power of two whose change of the law's variable, of so much a pulse, and duration
+ * are within the limits; where fewer are left, so many whole runs as before. Down from twice the last group's size, which is
+ * nearly always enough. */
+static NOINLINE uint16_t choose_group(ramp_t *ramp, uint16_t left)
+{
+    NEAR(ramp);
+    uint16_t ticks = ramp->ticks;
+    ramp->rest = false;
+    if (ticks < ramp->split_ticks) {
+        /* Where a few pulses could not be reloaded in time, the last run is of many. */
+        if (left < 2 * REST_PULSES)
+            ramp->rest = true;
+        else
+            left = (uint16_t)(left - REST_PULSES);
+    }
+    uint8_t log2 = ramp->group_log2;
+    ramp->group_log2 = 0;
+    if (ticks > GROUP_MAX_TICKS / 2)
+        return 1; /* often, near a standstill */
+    uint32_t change = ramp->step;
+    uint32_t most_change = ramp->v;
+    if (ramp->linear) {
+        change = wide_half(&ramp->c, 1);
+        most_change = 2 * wide_half(&ramp->x, 1);
+    }
+    if (ramp->bounded)
+        change = 0;
+    uint8_t part = part_log2(ramp);
+    most_change >>= part;
+    if (!ramp->faster) {
+        ticks = (uint16_t)(ticks + (ticks >> part)); /* they grow, and the variable shrinks */
+        most_change -= most_change >> 2;
+    }
+    if (++log2 > ramp->most_log2)
+        log2 = ramp->most_log2;
+    uint16_t most_ticks = ramp->steep > 1 ? GROUP_MAX_STEEP_TICKS : GROUP_MAX_TICKS;
+    while (log2 && (ticks > most_ticks >> log2 || change > most_change >> log2))
+        log2--;
+    uint16_t pulses = (uint16_t)(1u << log2);
+    ramp->group_log2 = log2;
+    if (ramp->rest && left <= pulses)
+        return left;
+    if (left >= pulses)
+        return pulses;
+    if (ramp->run_pulses == 0 || (ramp->steep > 1 && left < ODD_GROUP_LEAST)) {
+        while (pulses > left)
+            pulses >>= 1;
+        return pulses;
+    }
+    uint16_t odd = (uint16_t)(left & (ramp->run_pulses - 1u));
+    if (odd == left)
+        ramp->rest = true;
+    else
+        left = (uint16_t)(left - odd);
+    return left;
+}
+
 /* The next group of a law: its pulses, and the interval at the mean of the velocities at both ends. */
 
 static uint16_t harmonic_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16)
@@ -304,33 +284,30 @@ static uint16_t linear_next(ramp_t *ramp, uint16_t left, wide_t *interval_q16, w
     wide_multiply(change, pulses);
     wide_change(&ramp->x, change, ramp->faster);
     uint32_t v = ramp->v;
-    ramp->v = wide_is_negative(&ramp->x) ? 0 : wide_root(&ramp->x);
+    ramp->v = wide_root(&ramp->x);
     set_interval(ramp, interval_q16, v + ramp->v + 1); /* roots are rounded down */
     return pulses;
 }
 
 /* -- both -------------------------------------------------------------------------------------------------------- */
 
-uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *block)
+uint16_t ramp_next(ramp_t *ramp, uint16_t left, ramp_time_t *sum, block_t *block)
 {
-    uint16_t few = (uint16_t)left;
-    if (left > 4u << GROUP_MAX_LOG2)
-        few = 4u << GROUP_MAX_LOG2;
     uint16_t pulses;
     group_t group;
     for (;;) {
         wide_t change;
         bool goes_on = false;
         if (!ramp->linear) {
-            pulses = harmonic_next(ramp, few, &group.sum_q16);
+            pulses = harmonic_next(ramp, left, &group.sum_q16);
         } else if (!ramp->bounded) {
             goes_on = true;
-            pulses = linear_next(ramp, few, &group.sum_q16, &change);
+            pulses = linear_next(ramp, left, &group.sum_q16, &change);
             wide_copy(&group.end_q16, &group.sum_q16);
         } else {
             wide_copy(&group.sum_q16, &ramp->limit.bound_q16);
             set_ticks(ramp, &group.sum_q16);
-            pulses = choose_group(ramp, few);
+            pulses = choose_group(ramp, left);
         }
         block->runs = 0;
         if (ramp->bounded)
@@ -351,7 +328,7 @@ uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *block
             /* All that is left: equal intervals, from this one on. */
             ramp->most_log2 = GROUP_MAX_LOG2;
             ramp->bounded = true;
-            few = 1;
+            left = 1;
         }
     }
     if (ramp->bounded)
@@ -360,4 +337,21 @@ uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *block
         ramp->run_pulses = block->pulses;
     set_time(sum, &group.sum_q16);
     return pulses;
+}
+#endif
+
+ramp_time_t ramp_interval(const ramp_constants_t *constants, uint32_t v)
+{
+    wide_t q16;
+    ramp_interval_q16(&q16, constants, v);
+    ramp_time_t time;
+    set_time(&time, &q16);
+    return time;
+}
+
+NOINLINE uint32_t ramp_velocity(const ramp_constants_t *constants, uint32_t ticks)
+{
+    wide_t v2_q16;
+    ramp_divide_k(&v2_q16, &constants->k2_q16, ticks);
+    return ((uint32_t)wide_from_byte(&v2_q16, 2) + 1) >> 1;
 }

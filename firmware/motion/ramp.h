@@ -8,7 +8,9 @@
  * Units:   ticks of the timer's clock (62.5 ns, or the external one's) with a fraction in 1/65536. Velocities in "units" =
  *          RPM * 100 * microstep factor, so that a ramp value in hundredths is the change per pulse whatever the factor, and
  *          interval = K / v.
- * Context: main loop only; no hardware. Tests: test/host/test_ramp.c, test/avr/.
+ * Context: main loop only; no hardware. ramp_begin() and ramp_next() are in assembler on the AVR (ramp.S, cycles there),
+ *          elsewhere in ramp.c; the same to the bit.
+ * Tests:   test/host/test_ramp.c, test_ramp_next.c, the same cases on the AVR.
  * Errors:  none; what is asked for has been checked (profile_check).
  * Limits:  steps_per_rev * slow_rpm >= 58 and steps_per_rev >= 8 (first intervals below about one second).
  */
@@ -21,8 +23,8 @@
 #include "motion/block.h"
 
 typedef struct {
-    uint32_t ticks;
     uint16_t frac_q16; /* 1/65536 tick */
+    uint32_t ticks;
 } ramp_time_t;
 
 /* What ramps depend on: motor and clock. */
@@ -84,6 +86,6 @@ void ramp_square(wide_t *x, uint32_t v);
 /* The next group of at most `left` pulses (>= 1): returns how many, up to 512, and the sum of their intervals; that of
  * several is below 65,536 ticks. How these follow each other: `block`, of which runs, pulses, top, slope and curve are set,
  * carry and width lost; no runs: alike. */
-uint16_t ramp_next(ramp_t *ramp, uint32_t left, ramp_time_t *sum, block_t *block);
+uint16_t ramp_next(ramp_t *ramp, uint16_t left, ramp_time_t *sum, block_t *block);
 
 #endif

@@ -265,6 +265,12 @@ static bool group_is_right(watch_t *w, const char *phase, uint16_t pulses, const
     return true;
 }
 
+/* As many as ramp_next() takes. */
+static uint16_t few(uint32_t pulses)
+{
+    return pulses > UINT16_MAX ? UINT16_MAX : (uint16_t)pulses;
+}
+
 static bool ramp_is_right(const trial_t *t, const char *phase, ramp_t *ramp,
                           uint32_t pulses, const exact_ramp_t *law, bool faster, long double shortest,
                           long double longest)
@@ -273,7 +279,7 @@ static bool ramp_is_right(const trial_t *t, const char *phase, ramp_t *ramp,
     while (pulses) {
         ramp_time_t sum;
         block_t block;
-        uint16_t group = ramp_next(ramp, pulses, &sum, &block);
+        uint16_t group = ramp_next(ramp, few(pulses), &sum, &block);
         if (group == 0 || group > pulses) {
             FAIL(t, "%s: group of %u, %u left", phase, group, pulses);
             return false;

@@ -130,6 +130,20 @@ static void test_shifts_go_both_ways_and_lose_what_leaves(void)
     }
 }
 
+static void test_a_root_is_truncated_and_0_of_what_is_below_0(void)
+{
+    uint64_t state = 6;
+    for (uint16_t i = 0; i < 500; i++) {
+        uint64_t root = (uint32_t)next_value(&state) >> 1;
+        wide_t square = product_of(root, root), next = square + 2 * root, negative = 0 - square - 1;
+        TEST_ASSERT_EQUAL_UINT32(root, wide_root(&square));
+        TEST_ASSERT_EQUAL_UINT32(root, wide_root(&next));
+        TEST_ASSERT_EQUAL_UINT32(0, wide_root(&negative));
+    }
+    wide_t most = INT64_MAX;
+    TEST_ASSERT_EQUAL_UINT32(3037000499u, wide_root(&most));
+}
+
 static void test_32_bits_are_taken_from_any_of_the_lower_bytes(void)
 {
     wide_t x = 0x8877665544332211u;
@@ -154,6 +168,7 @@ int main(void)
     RUN_TEST(test_a_fraction_is_the_upper_half_of_the_product_or_up_to_four_less);
     RUN_TEST(test_a_fraction_is_that_of_the_products_which_are_not_left_out);
     RUN_TEST(test_shifts_go_both_ways_and_lose_what_leaves);
+    RUN_TEST(test_a_root_is_truncated_and_0_of_what_is_below_0);
     RUN_TEST(test_32_bits_are_taken_from_any_of_the_lower_bytes);
     return UNITY_END();
 }
