@@ -10,10 +10,10 @@
 ; all the others together have held up for a bit finds the next one due, and takes it at once.
 ;
 ;                       flag raised to `sei`   `cli` to end of `reti`   whole run
-;   start edge          15 cycles masked       9                        73
-;   sample              11                     23                       87, with a byte 117
-;   bit sent            10                     8                        73, with the next byte 87
-;   in between TIMSK0 is changed: 6 cycles masked, at the start edge 13
+;   start edge          15 cycles masked       9                        83
+;   sample              11                     23                       76, with a byte 94, one that is lost 113
+;   bit sent            10                     8                        75, with the next byte 98
+;   in between TIMSK0 is changed: 6 cycles masked, at the start edge 13, at the stop bit 12 (a start edge missed: 16)
 ;
 ; Source: ATmega328P datasheet DS40002061, 13.2.4 to 13.2.6 (pin changes), 15.5.3 (compare output), 15.9.
 
@@ -22,7 +22,8 @@
 
 #define ADDRESS(name) _SFR_MEM_ADDR(name)
 #define IO(name) _SFR_IO_ADDR(name)
-#define EARLY 13  /* ticks that a sample aims before the middle */
+#define EARLY 11  /* ticks that a sample aims before the middle */
+#define MISSED 6  /* ticks from where a start edge is found missed to the sample of its bit */
 #define PASSED 64 /* up to so many ticks ago is past; farther is to come */
 
 .section .bss
@@ -102,9 +103,7 @@ PCINT2_vect:                    ; cycles since the flag was raised
     cpi  r25, PASSED
     brlo passed
     sei
-    RESTORE
-    pop  r24
-    reti
+    rjmp done
 passed:                         ; by a long step interrupt: the sample is due
     sbi  IO(TIFR0), OCF0B
     in   r24, IO(PIND)
@@ -159,6 +158,7 @@ sampled:
     dec  r25
     cpi  r25, PASSED
     brlo passed                 ; all other interrupts at once: longer than a bit
+done:
     RESTORE
     pop  r24
     reti                        ; 22
@@ -173,14 +173,28 @@ glitch:
     INTERRUPT_OFF OCIE0B
     rjmp wait_for_start
 
-; The start edge is awaited before the stop bit is looked at: a faster peer's next one may come at once. Where the line
-; stays low, its end is a rising edge and no start.
+; The start edge is awaited from here on: a faster peer's next one may come at once. Where the line stays low, its end is a
+; rising edge and no start. Others may have held this up until the stop bit was over: then the line was high when the sample
+; was taken, and is low now. That edge is not waited for, but taken to have been a moment ago.
 stop_bit:
-    INTERRUPT_OFF OCIE0B
-    ldi  r24, 1 << PORT_SW_RX
-    sts  ADDRESS(PCMSK2), r24
-    sbi  IO(PCIFR), PCIF2
-    sbis IO(PIND), PORT_SW_RX
+    ldi  r25, 1 << PORT_SW_RX
+    cli                         ; cycles masked
+    sts  ADDRESS(PCMSK2), r25   ; 2
+    sbrc r24, PORT_SW_RX
+    sbic IO(PIND), PORT_SW_RX
+    rjmp 1f                     ; 6
+    ldi  r25, 0                 ; should the edge be noted all the same, PCINT2 does this again, and better
+    sts  ADDRESS(PCMSK2), r25
+    std  Z + SOFT_RX_BITS, r25
+    in   r25, IO(TCNT0)
+    subi r25, -MISSED
+    out  IO(OCR0B), r25
+    rjmp 2f
+1:  lds  r25, ADDRESS(TIMSK0)
+    andi r25, ~(1 << OCIE0B)
+    sts  ADDRESS(TIMSK0), r25   ; 11
+2:  sei                         ; 12
+    sbrs r24, PORT_SW_RX
     rjmp framing_error
     ldd  r24, Z + SOFT_RX_SHIFT
 store:
@@ -202,11 +216,10 @@ stored:
     subi r30, lo8(-(SOFT_PORT + PORT_RX))
     sbci r31, hi8(-(SOFT_PORT + PORT_RX))
     st   Z, r24
+wake:
     ldi  r24, 1
     sts  wake_flag, r24
-    RESTORE
-    pop  r24
-    reti
+    rjmp done
 
 full:                           ; the newest byte becomes PORT_DAMAGED: the main loop cannot be reading that one
     ldd  r24, Z + SOFT_PORT + PORT_OVERRUNS
@@ -304,8 +317,4 @@ over:
     ldd  r24, Z + SOFT_ENDED
     sbrc r24, 0
     cbi  IO(PORTD), PORT_TX_EN
-    ldi  r24, 1
-    sts  wake_flag, r24         ; who waits for the end of the output goes on
-    RESTORE
-    pop  r24
-    reti
+    rjmp wake                   ; who waits for the end of the output goes on
