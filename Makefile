@@ -229,7 +229,9 @@ TIMED := main terminal_poll terminal_port_get terminal_port_put line_take comman
     note_begun pulses_left pulses_in_gear pulses_of_phase add_pulses ops_poll \
     set_interval cruise_next append append_run block_append push \
     get begin_ring drop_emission direction_flags signed_pulses make_ready profile_interval engine_check \
-    execute_read fill set_silence emit_phase emit
+    execute_read fill set_silence emit_phase emit next_group choose_phase \
+    put free_places terminal_port_waiting motion_syntax_take motion_syntax_number motion_syntax_end close_parameter range_check \
+    session_template pay attend bus_poll network_poll
 $(OUTLINE): tools/outline.py $(BUILD)/firmware/flags
 	@mkdir -p $(@D)
 	@echo '#!/bin/sh' >$@

@@ -6,7 +6,7 @@
 
 export const EXACT_BOUND = 0; /* avr8js' counter against the board's pin: any interval, any sum of intervals */
 export const RAW_BOUND = 7; /* avr8js' pin against the board's pin, likewise: what it lags behind its counter */
-export const START_BOUND = 600; /* from a line typed to its first edge: software; a round of the main loop, that the line meets at other moments */
+export const START_BOUND = 400; /* from a line typed to its first edge: software */
 
 /* Greatest difference between two lists of times: of neighbours, and since the first of all; and where the neighbours
  * first differ by more than the bound, or -1. */
