@@ -32,7 +32,7 @@
 #define START_PERIODS 4u         /* and at least so many: a segment is loaded when the one before it begins */
 #define GEAR_CYCLES 1600u        /* with auto-micro: no pulses nearer than these, if larger steps can help it */
 #define HOLD_LEAST 64u           /* pulses that may be repeated if the ring runs empty; with fewer, more are allowed */
-#define RING_REFILL (12u * SEGMENT_BYTES) /* free segments for a block to be gone on with */
+#define RING_REFILL (12u * SEGMENT_BYTES) /* free segments for a block to be gone on with, while no command waits */
 #define RING_RESERVE (4u * SEGMENT_BYTES) /* segments that one step of emission may need */
 
 /* What comes next of the command being emitted. */
@@ -1251,18 +1251,19 @@ static NOINLINE uint8_t play_on(void)
                 expire_gap();
         }
     }
-    if (engine.next && engine.playing && !engine.single && engine.stage > STAGE_TAIL)
-        join_next();
     /* Until the ring is three quarters full nothing else is as urgent, within reason; then a step at a time. (A timer that
      * has run out of segments is started again as soon as there is one.) */
     uint8_t rounds = 6;
     if (engine.playing) {
         do {
-            uint8_t least = block.runs ? RING_REFILL : RING_RESERVE;
+            /* A command that waits is joined as soon as this one is in the ring: as far ahead of its end as it can be. */
+            uint8_t least = block.runs && !engine.next ? RING_REFILL : RING_RESERVE;
             if (ring_free() < least || !emit())
                 break;
             worked = 1;
         } while (ring_free() > SEGMENT_COUNT / 4 * SEGMENT_BYTES && !step_idle && --rounds);
+        if (engine.next && !engine.single && engine.stage > STAGE_TAIL)
+            join_next();
     }
     return worked;
 }
