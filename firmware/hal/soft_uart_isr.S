@@ -18,7 +18,7 @@
 ;   sample              11                     23                       76, with a byte 94, one that is lost 113
 ;   bit sent            18, with PCINT1 31     -                        91, with the next byte 114
 ;   in between TIMSK0 is changed: 6 cycles masked, at the start edge 13, at the stop bit 12 (a start edge missed: 16);
-;   OCR0A is written: 4
+;   OCR0A is written: 8
 ;
 ; Source: ATmega328P datasheet DS40002061, 13.2.4 to 13.2.6 (pin changes), 15.5.3 (compare output), 15.9.
 
@@ -283,11 +283,11 @@ edge:
     cli                         ; cycles masked
     out  IO(OCR0A), r24         ; 1
     in   r25, IO(TCNT0)         ; 2
-    sei                         ; 3
     sub  r25, r24
     dec  r25
     cpi  r25, PASSED
-    brlo late                   ; all other interrupts at once: longer than a bit
+    brlo late                   ; 6: all other interrupts at once: longer than a bit
+    sei                         ; 7
 bit_sent:
     RESTORE
     pop  r24
@@ -296,6 +296,8 @@ bit_sent:
     reti
 
 late:                           ; the edge is made now, and the next one where it belongs
+    sbi  IO(TIFR0), OCF0A
+    sei
     ldi  r25, 1 << FOC0A | 1 << CS01
     out  IO(TCCR0B), r25
     rjmp next_edge
