@@ -23,8 +23,8 @@
 PCINT1_vect:
     push r24                    ; 9 cycles since the flag was raised
     ldi  r24, 1 << PCIE2        ; 10
-    sts  ADDRESS(PCICR), r24    ; 12
-    sei                         ; 13
+    sei                         ; 11
+    sts  ADDRESS(PCICR), r24    ; 13: behind `sei` none comes before this
     in   r24, IO_SREG
     push r24
     push r25

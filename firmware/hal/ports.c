@@ -67,8 +67,8 @@ static void soft_init(void)
 
 static void usart_enable(uint8_t ended)
 {
-    usart_control = USART_CONTROL | _BV(RXCIE0) | ended;
-    UCSR0B = usart_control | _BV(UDRIE0); /* output may be under way; if not, it is masked again */
+    usart_control = USART_CONTROL | ended;
+    UCSR0B = usart_control | _BV(RXCIE0) | _BV(UDRIE0); /* output may be under way; if not, it is masked again */
 }
 
 void ports_init(void)
@@ -152,7 +152,7 @@ static void put(uint8_t software, uint8_t byte)
     if (!software) {
         UCSR0A = (uint8_t)((UCSR0A & _BV(U2X0)) | _BV(TXC0)); /* cleared, until this one is out (20.11.2) */
         append(&usart_port, byte);
-        UCSR0B = usart_control | _BV(UDRIE0);
+        UCSR0B = usart_control | _BV(RXCIE0) | _BV(UDRIE0);
         return;
     }
     append(&soft_uart.port, byte);

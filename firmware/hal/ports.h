@@ -58,7 +58,8 @@ typedef struct {
 
 extern port_t usart_port;
 
-/* UCSR0B while the transmit ring is empty; UDRIE0 comes to it while it is not. Written by the main loop alone. */
+/* UCSR0B without RXCIE0, which comes to it unless an interrupt of either port is at work, and UDRIE0, while the transmit
+ * ring is not empty. Written by the main loop alone. */
 extern volatile uint8_t usart_control;
 
 /* A bit is a number of equal intervals, a power of two: one above 11,765 Bd. They are in ticks of Timer0, 0.5 us, with a

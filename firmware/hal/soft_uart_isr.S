@@ -6,14 +6,19 @@
 ;
 ; As the others these let interrupts in at once. The start edge goes before the step interrupt all the same: where that
 ; cannot bear it, the main loop takes both receiving interrupts away (step_hurry.S). It masks itself (PCMSK2; PCICR is a
-; constant of encoder_isr.S); a match comes again only where the next one is written, and that is last of all. A sample that
-; all the others together have held up for a bit finds the next one due, and takes it at once.
+; constant of encoder_isr.S); a match comes again only where the next one is written, and that is last of all.
+;
+; All the others together may take longer than a bit. A sample that they have held up so long finds the next one due, and
+; takes it at once. An edge of S/W Tx would come a turn of Timer0 late, so those of USART0, which can wait longest, are off
+; while a bit is sent; should that not do, the edge is made when it is found late (a step each reload, the encoder bouncing).
+; Only then can the next match interrupt this one, behind its last store: a frame more of 8 bytes.
 ;
 ;                       flag raised to `sei`   `cli` to end of `reti`   whole run
-;   start edge          15 cycles masked       9                        83
+;   start edge          15 cycles masked       9                        77
 ;   sample              11                     23                       76, with a byte 94, one that is lost 113
-;   bit sent            10                     8                        75, with the next byte 98
-;   in between TIMSK0 is changed: 6 cycles masked, at the start edge 13, at the stop bit 12 (a start edge missed: 16)
+;   bit sent            18, with PCINT1 31     -                        91, with the next byte 114
+;   in between TIMSK0 is changed: 6 cycles masked, at the start edge 13, at the stop bit 12 (a start edge missed: 16);
+;   OCR0A is written: 8
 ;
 ; Source: ATmega328P datasheet DS40002061, 13.2.4 to 13.2.6 (pin changes), 15.5.3 (compare output), 15.9.
 
@@ -73,20 +78,15 @@ PCINT2_vect:                    ; cycles since the flag was raised
     SAVE
     sbic IO(PIND), PORT_SW_RX
     rjmp wait_for_start         ; the edge was a rising one, or a glitch is over
-    ldd  r25, Z + SOFT_INTERVAL + 1
-    add  r24, r25
     ldd  r25, Z + SOFT_INTERVALS
-    sbrs r25, 0
-    rjmp 1f
-    ldd  r25, Z + SOFT_INTERVAL + 1
-    inc  r25
-    lsr  r25                    ; the only interval of the bit: its half
-    sub  r24, r25
-    ldi  r25, 1
-1:  subi r24, EARLY
-    inc  r25                    ; half of the intervals, 1 of 1
+    inc  r25                    ; half of them, 1 of 1, and of that one a half
     lsr  r25
     std  Z + SOFT_RX_INTERVALS, r25
+    ldd  r25, Z + SOFT_INTERVAL + 1
+    brcs . + 2                  ; over the next instruction
+    lsr  r25
+    add  r24, r25
+    subi r24, EARLY
     ldi  r25, 0
     std  Z + SOFT_RX_BITS, r25
     std  Z + SOFT_RX_FRACTION, r25
@@ -246,18 +246,21 @@ framing_error:
 .global TIMER0_COMPA_vect
 TIMER0_COMPA_vect:
     push r24                    ; 9
-    sei                         ; 10
+    lds  r24, ADDRESS(UCSR0B)   ; 11
+    push r24                    ; 13
+    lds  r24, usart_control     ; 15
+    sei                         ; 16
+    sts  ADDRESS(UCSR0B), r24   ; 18: behind `sei` none comes before this
     push r25
     SAVE
+next_edge:
     ldd  r25, Z + SOFT_TX_INTERVALS
     dec  r25
     brne 3f
     ldd  r25, Z + SOFT_TX_BITS
     subi r25, 1
-    brcs next_byte              ; the stop bit has just begun
-    breq 1f                     ; it comes
-    cpi  r25, SOFT_TX_LAST - 1
-    breq next_byte              ; it is over
+    breq 1f                     ; the stop bit comes
+    brmi next_byte              ; it has just begun, or is over
     ldd  r24, Z + SOFT_TX_SHIFT
     lsr  r24
     std  Z + SOFT_TX_SHIFT, r24
@@ -277,11 +280,27 @@ edge:
     in   r24, IO(OCR0A)
     ldd  r25, Z + SOFT_INTERVAL + 1
     adc  r24, r25
-    RESTORE
     cli                         ; cycles masked
     out  IO(OCR0A), r24         ; 1
-    pop  r24                    ; 3
-    reti                        ; 7
+    in   r25, IO(TCNT0)         ; 2
+    sub  r25, r24
+    dec  r25
+    cpi  r25, PASSED
+    brlo late                   ; 6: all other interrupts at once: longer than a bit
+    sei                         ; 7
+bit_sent:
+    RESTORE
+    pop  r24
+    sts  ADDRESS(UCSR0B), r24
+    pop  r24
+    reti
+
+late:                           ; the edge is made now, and the next one where it belongs
+    sbi  IO(TIFR0), OCF0A
+    sei
+    ldi  r25, 1 << FOC0A | 1 << CS01
+    out  IO(TCCR0B), r25
+    rjmp next_edge
 
 next_byte:                      ; r25: 0xFF or SOFT_TX_LAST - 1
     ldd  r24, Z + SOFT_PORT + PORT_TX_TAIL
@@ -317,4 +336,6 @@ over:
     ldd  r24, Z + SOFT_ENDED
     sbrc r24, 0
     cbi  IO(PORTD), PORT_TX_EN
-    rjmp wake                   ; who waits for the end of the output goes on
+    ldi  r24, 1
+    sts  wake_flag, r24         ; who waits for the end of the output goes on
+    rjmp bit_sent

@@ -6,10 +6,11 @@
 ;
 ;   flag raised to `sei`     13 cycles with interrupts masked (entry 4, vector jump 3, 6 here)
 ;   `cli` to end of `reti`   9 cycles masked
-;   whole run                receive 78 cycles (overrun 102), transmit 77
+;   whole run                receive 79 cycles (overrun 103), transmit 78
 ;
 ; What UCSR0B is afterwards follows from the transmit ring alone: UDRIE0 is set unless that is empty; the rest is
-; usart_control. So nobody has to read it, and ports.c may write it at any time.
+; usart_control and RXCIE0. So ports.c may write it at any time, and only who interrupts these has to read it, to put it back
+; (soft_uart_isr.S).
 ; Shared: ports.h says who writes which index.
 ; Source: ATmega328P datasheet DS40002061, 20.7.3 (receiver error flags: read UCSR0A before UDR0), 20.11.3.
 
@@ -76,6 +77,7 @@ done:
     lds  r24, usart_control
     breq . + 2                  ; over the next instruction
     ori  r24, 1 << UDRIE0
+    ori  r24, 1 << RXCIE0
     pop  r25
     out  IO_SREG, r25           ; nothing below changes flags
     pop  r31

@@ -104,17 +104,20 @@ static void test_a_typed_line_is_answered_at_each_rate(void)
     }
 }
 
-static void cruise_at_33_khz(void)
+static void step_at_33_khz(const char *line)
 {
+    char typed[40], answer[40];
+    snprintf(typed, sizeof typed, "%s\r", line);
+    snprintf(answer, sizeof answer, "%s\r\nSAC>", line);
     boot_at(38400);
     assert_answer("f1u0\r", bit, "f1u0\r\n?1 unknown command\r\nSAC>");
-    assert_answer("m9000000vc30a999d999\r", bit, "m9000000vc30a999d999\r\nSAC>");
+    assert_answer(typed, bit, answer);
 }
 
 /* NET-005: the peer's clock off by 3 %, the motor at 33 kHz; every edge of S/W Tx within one tick meanwhile */
 static void test_no_byte_is_wrong_while_the_motor_steps_at_33_khz(void)
 {
-    cruise_at_33_khz();
+    step_at_33_khz("m9000000vc30a999d999");
     image_run(500 * MS);
     /* All phases of the step interrupt (make test-phases-long), or one for each clock. */
     const uint64_t period = 480;
@@ -131,17 +134,54 @@ static void test_no_byte_is_wrong_while_the_motor_steps_at_33_khz(void)
                phases);
 }
 
-/* A character's last sample comes late, its successor's start edge early: it is found nevertheless, in any phase. */
-static void test_a_fast_peer_may_send_a_line_without_a_pause(void)
+/* Of 60 characters, back to back from a peer 3 % fast. */
+static void assert_long_line_is_answered(void)
 {
     static const char line[] = "UUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUUU";
     char typed[sizeof line + 1], answer[sizeof line + 40];
     snprintf(typed, sizeof typed, "%s\r", line);
     snprintf(answer, sizeof answer, "%s\r\n?1 unknown command\r\nSAC>", line);
-    cruise_at_33_khz();
+    assert_answer(typed, bit * 0.97, answer);
+}
+
+/* A character's last sample comes late, its successor's start edge early: it is found nevertheless, in any phase. */
+static void test_a_fast_peer_may_send_a_line_without_a_pause(void)
+{
+    step_at_33_khz("m9000000vc30a999d999");
     for (unsigned k = 0; k < 48; k++) {
         image_run(480 - board_cycle(board) % 480 + 10 * k); /* a phase of the step interrupt */
-        assert_answer(typed, bit * 0.97, answer);
+        assert_long_line_is_answered();
+    }
+}
+
+/* S/W Rx, S/W Tx and the hardware port at once, and each pulse of a ramp has a segment of its own. */
+static void test_edges_are_sent_in_time_with_all_interrupts_at_once(void)
+{
+    uint8_t others[64];
+    memset(others, 'U', sizeof others);
+    step_at_33_khz("m300000vc30a10d10l1");
+    for (unsigned k = 0; k < 60; k++) {
+        board_uart_send(board, others, sizeof others);
+        image_run(100 + 29 * k);
+        assert_long_line_is_answered();
+    }
+}
+
+/* The encoder bounces now and then, with edges so near that for a bit hardly anything else is done: an edge of S/W Tx comes
+ * late, no bit is lost. */
+static void test_bytes_are_sent_while_the_encoder_bounces(void)
+{
+    enum { BURSTS = 300, EDGES = 8, EVERY = 62 };
+    boot_at(38400);
+    for (unsigned i = 0; i < 10; i++) {
+        const uint64_t from = board_cycle(board) + MS;
+        soft_peer_clear();
+        type("p\r", bit);
+        for (unsigned k = 0; k < BURSTS * EDGES; k++)
+            board_pin_drive_at(board, BOARD_PIN('C', 0), k & 1, from + k / EDGES * (3000 + 7 * i) + k % EDGES * EVERY);
+        image_run(BURSTS * 4000);
+        TEST_ASSERT_EQUAL_STRING(AT_REST, soft_peer_text());
+        TEST_ASSERT_EQUAL_UINT(0, soft_peer_bad);
     }
 }
 
@@ -255,6 +295,38 @@ static void test_pulses_are_counted_at_500_khz_whatever_comes_at_the_software_po
     }
 }
 
+/* What has been in the port's ring goes out again and again; edges of the encoder go before step interrupts too. */
+static void test_pulses_are_counted_at_500_khz_while_the_software_port_sends(void)
+{
+    enum { TX_HEAD = 12 + 2, TX_TAIL = 12 + 3, PLACES = 32, TIMSK0 = 0x6E, OCIE0A = 1 };
+    uint16_t soft = 0;
+    boot_fast(1, 1);
+    TEST_ASSERT_TRUE(board_symbol(board, "soft_uart", &soft));
+    image_train_clear();
+    train.keep = false;
+    type("m300000vc4a999d999\r", bit);
+    while ((board_peek8(board, TIMSK0) & 1 << OCIE0A) == 0)
+        image_run(100); /* until its echo begins */
+    soft_peer_clear();
+    while (train.count < 590000) {
+        const uint8_t head = board_peek8(board, (uint16_t)(soft + TX_HEAD));
+        board_poke8(board, (uint16_t)(soft + TX_TAIL), (uint8_t)((head + 1) % PLACES));
+        const uint64_t from = board_cycle(board) + 10;
+        for (unsigned k = 0; k < 20; k++)
+            board_pin_drive_at(board, BOARD_PIN('C', 0), k & 1, from + 2000 * k + roll(1900));
+        image_run(40100);
+    }
+    image_run(SECOND / 2);
+    TEST_ASSERT_EQUAL_size_t(600000, train.count);
+    size_t sent;
+    soft_peer_bytes(&sent);
+    TEST_ASSERT_GREATER_THAN(4000, sent);
+    type("p\r", bit);
+    image_run(20 * MS);
+    if (strstr(soft_peer_text(), "position 600000 STANDBY faults 0") == NULL)
+        image_fail("expected position 600000, saw \"%s\"", soft_peer_text());
+}
+
 /* The middle one of three commands is too fast. */
 static void test_the_software_port_is_deaf_no_longer_than_periods_are_short(void)
 {
@@ -304,9 +376,12 @@ int main(void)
     RUN_TEST(test_a_typed_line_is_answered_at_each_rate);
     RUN_TEST(test_no_byte_is_wrong_while_the_motor_steps_at_33_khz);
     RUN_TEST(test_a_fast_peer_may_send_a_line_without_a_pause);
+    RUN_TEST(test_edges_are_sent_in_time_with_all_interrupts_at_once);
+    RUN_TEST(test_bytes_are_sent_while_the_encoder_bounces);
     RUN_TEST(test_a_glitch_is_no_byte);
     RUN_TEST(test_a_break_spoils_one_line_and_does_not_repeat);
     RUN_TEST(test_pulses_are_counted_at_500_khz_whatever_comes_at_the_software_port);
+    RUN_TEST(test_pulses_are_counted_at_500_khz_while_the_software_port_sends);
     RUN_TEST(test_the_software_port_is_deaf_no_longer_than_periods_are_short);
     RUN_TEST(test_the_software_port_hears_after_a_stop_at_500_khz);
     return UNITY_END();
