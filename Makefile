@@ -181,7 +181,6 @@ AVR_SMALLER = -Os -mcall-prologues -mstrict-X -fno-gcse -fno-move-loop-invariant
     -fno-tree-copy-prop -fno-tree-coalesce-vars -fno-tree-scev-cprop -fno-tree-reassoc -fno-tree-pta -flto-partition=none \
     $(if $(filter 5.%,$(AVR_VERSION)),-fno-tree-sink -fweb -fno-toplevel-reorder)
 # What suits single files. Arithmetic of 32 bits nearly throughout: smaller if the registers of a value stay together.
-SMALLER_firmware/motion/ramp.c := -fno-split-wide-types
 SMALLER_firmware/motion/profile.c := -fno-split-wide-types
 SMALLER_firmware/motion/engine.c := -ftree-dominator-opts -ftree-sink -fno-tree-fre -fno-tree-loop-optimize
 AVR_CFLAGS = $(AVR_MCU) -DF_CPU=16000000UL -std=gnu11 $(AVR_SMALLER) -g -ffunction-sections -fdata-sections -fshort-enums \
