@@ -158,13 +158,9 @@ plan:   movw    r30, r14
         ldd     r24, Z + BLOCK_PULSES
         std     Y + RAMP_RUN_PULSES, r24
 
-leave:  movw    r30, r16
-        movw    r26, r12
-        ldi     r18, RAMP_TIME_SIZE
-1:      ld      r0, Z+
-        st      X+, r0
-        dec     r18
-        brne    1b
+leave:  movw    r24, r12
+        movw    r22, r16
+        call    wide_copy
         movw    r24, r8
         restore_registers frame=GROUP_SIZE
 
