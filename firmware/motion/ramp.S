@@ -650,7 +650,6 @@ begin_linear:
         ldi     r21, hi8(LINEAR_SQUARE_Q15)
         ldi     r22, hlo8(LINEAR_SQUARE_Q15)
         ldi     r23, hhi8(LINEAR_SQUARE_Q15)
-        movw    r24, r4
         call    wide_multiply
         movw    r30, r8
         ldd     r6, Z + CONSTANTS_STEPS_PER_REV
