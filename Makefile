@@ -182,7 +182,6 @@ AVR_SMALLER = -Os -mcall-prologues -mstrict-X -fno-gcse -fno-move-loop-invariant
     $(if $(filter 5.%,$(AVR_VERSION)),-fno-tree-sink -fweb -fno-toplevel-reorder)
 # What suits single files, found by trying. (Arithmetic of 32 bits nearly throughout is smaller if the registers of a value
 # stay together.)
-SMALLER_firmware/motion/ramp.c := -fno-split-wide-types
 SMALLER_firmware/motion/profile.c := -fno-split-wide-types
 SMALLER_firmware/motion/engine.c := -ftree-dominator-opts -ftree-sink -fno-tree-fre -fno-tree-loop-optimize
 SMALLER_firmware/queue/queue.c := -fno-cprop-registers

@@ -719,9 +719,7 @@ static NOINLINE uint16_t next_group(uint16_t at_most, ramp_time_t *sum)
     while ((uint8_t)steps & part) { /* steep: in less than a pulse the velocity changes by much */
         ramp_time_t more;
         steps = (uint16_t)(steps + ramp_next(&ramp, (uint8_t)(0u - steps) & part, &more, &block));
-        uint32_t frac = (uint32_t)sum->frac_q16 + more.frac_q16;
-        sum->frac_q16 = (uint16_t)frac;
-        sum->ticks += more.ticks + (frac >> 16);
+        wide_add(&sum->q16, &more.q16);
         block.runs = 0;
     }
     uint16_t pulses = (uint16_t)(steps >> gear);
@@ -1492,8 +1490,11 @@ void engine_velocity(uint32_t *rpm, uint32_t *cycle_us)
         exact_cycle_us = 0;
     }
     *rpm = (v >> basis.factor_log2) / 100u;
-    if (exact_cycle_us == 0)
-        exact_cycle_us = us_of(0, ramp_interval(&basis.ramp, v).ticks << basis.factor_log2);
+    if (exact_cycle_us == 0) {
+        ramp_time_t interval;
+        ramp_interval_q16(&interval.q16, &basis.ramp, v);
+        exact_cycle_us = us_of(0, interval.ticks << basis.factor_log2);
+    }
     *cycle_us = exact_cycle_us;
 }
 

@@ -46,7 +46,7 @@ CHECK(CONSTANTS_SPLIT_TICKS, ramp_constants_t, split_ticks);
 _Static_assert(offsetof(ramp_constants_t, k2_q16) == 0, "ramp.S");
 CHECK(GROUP_SUM, group_t, sum_q16);
 CHECK(GROUP_END, group_t, end_q16);
-_Static_assert(GROUP_SIZE == sizeof(group_t) && RAMP_TIME_SIZE == sizeof(ramp_time_t), "group_layout.h: sizes");
+_Static_assert(GROUP_SIZE == sizeof(group_t), "group_layout.h: size of group_t");
 _Static_assert(BLOCK_TOP == 0 && BLOCK_SLOPE == 4 && BLOCK_CURVE == 8 && BLOCK_THIRD == 12 && BLOCK_WIDTH == 14,
                "group.S goes from one to the next");
 _Static_assert(GROUP_MAX_TICKS % 256 == 0 && GROUP_MAX_STEEP_TICKS % 256 == 0, "ramp.S sets their upper bytes alone");

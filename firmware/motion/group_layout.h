@@ -36,8 +36,6 @@
 #define CONSTANTS_CYCLES_LOG2 14
 #define CONSTANTS_SPLIT_TICKS 15
 
-#define RAMP_TIME_SIZE 6 /* of ramp_time_t, the lower bytes of an interval in 1/65536 */
-
 /* ramp_t.rate has 40 bits behind the point in a harmonic ramp. In a linear one it has so many; half of its product with
  * an interval is shifted to 40. */
 #define LINEAR_RATE_LOG2 48

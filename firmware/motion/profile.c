@@ -13,7 +13,8 @@ void profile_basis(profile_basis_t *basis, uint16_t steps_per_rev, uint8_t facto
     basis->us_rpm = (uint32_t)60000000 / steps_per_rev;
     basis->factor_log2 = factor_log2;
     basis->v_slow = (uint32_t)slow_rpm * 100u << factor_log2;
-    ramp_time_t slow = ramp_interval(&basis->ramp, basis->v_slow);
+    ramp_time_t slow;
+    ramp_interval_q16(&slow.q16, &basis->ramp, basis->v_slow);
     basis->slow_ticks = slow.ticks + (slow.frac_q16 != 0);
 }
 

@@ -1,4 +1,4 @@
-/* ramp_begin() and ramp_next() of ramp.h for the AVR. Cycles: the next group of a harmonic ramp 3,200, of a linear one 4,700,
+/* ramp_begin() and ramp_next() of ramp.h for the AVR. Cycles: the next group of a harmonic ramp 3,100, of a linear one 4,700,
  * group_plan() among them; to begin 1,900 and 8,300. The C version in ramp.c, where the reasons are, is what runs on the
  * host. */
 #include "base/registers.h"
@@ -46,7 +46,12 @@ linear: rcall   choose_units
         ldd     r20, Y + RAMP_FASTER
         rcall   change_square
         sec                     /* roots are rounded down */
-        rjmp    mean
+        rcall   set_interval_at_mean
+        movw    r24, r16
+        adiw    r24, GROUP_END
+        movw    r22, r16
+        call    wide_copy
+        rjmp    plan
 
 /* r2, r3: pulses left, or to the limit; r4-r7: v at the first pulse */
 harmonic:
@@ -114,26 +119,18 @@ harmonic:
         sbc     r24, r20
         sbc     r25, r21
 4:      clc
-
-/* The interval at the mean of two velocities: r4-r7, and r22-r25 with the carry. */
-mean:   adc     r22, r4
-        adc     r23, r5
-        adc     r24, r6
-        adc     r25, r7
-        rcall   set_interval
+        rcall   set_interval_at_mean
         ldd     r24, Y + RAMP_BOUNDED
         sbrc    r24, 0
         rjmp    bounded
-        movw    r24, r16
-        adiw    r24, GROUP_END
-        movw    r22, r16
-        call    wide_copy       /* (r22, r23 stay) */
-        movw    r30, r14
+
+plan:   movw    r30, r14
         std     Z + BLOCK_RUNS, r1
         movw    r24, r8
         sbiw    r24, 2
         brlo    1f
         movw    r24, r28
+        movw    r22, r16
         movw    r20, r14
         movw    r18, r8
         call    group_plan
@@ -161,13 +158,9 @@ mean:   adc     r22, r4
         ldd     r24, Z + BLOCK_PULSES
         std     Y + RAMP_RUN_PULSES, r24
 
-leave:  movw    r30, r16
-        movw    r26, r12
-        ldi     r18, RAMP_TIME_SIZE
-1:      ld      r0, Z+
-        st      X+, r0
-        dec     r18
-        brne    1b
+leave:  movw    r24, r12
+        movw    r22, r16
+        call    wide_copy
         movw    r24, r8
         restore_registers frame=GROUP_SIZE
 
@@ -412,6 +405,13 @@ choose_group:
 9:      movw    r8, r22
         ret
 
+/* The sum becomes the interval at the mean of two velocities: r4-r7, and r22-r25 with the carry. */
+set_interval_at_mean:
+        adc     r22, r4
+        adc     r23, r5
+        adc     r24, r6
+        adc     r25, r7
+
 /* The sum becomes 2 K / v2, v2 in r22-r25. */
 set_interval:
         movw    r18, r22
@@ -650,7 +650,6 @@ begin_linear:
         ldi     r21, hi8(LINEAR_SQUARE_Q15)
         ldi     r22, hlo8(LINEAR_SQUARE_Q15)
         ldi     r23, hhi8(LINEAR_SQUARE_Q15)
-        movw    r24, r4
         call    wide_multiply
         movw    r30, r8
         ldd     r6, Z + CONSTANTS_STEPS_PER_REV

@@ -28,13 +28,6 @@ void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev, uint32_
 /* quotient = k2_q16 / divisor */
 void ramp_divide_k(wide_t *quotient, const wide_t *k2_q16, uint32_t divisor);
 
-/* Of ticks in 1/65536. */
-static void set_time(ramp_time_t *time, const wide_t *q16)
-{
-    time->ticks = (uint32_t)wide_from_byte(q16, 2);
-    time->frac_q16 = (uint16_t)*q16;
-}
-
 #if !defined __AVR__ || defined RAMP_IN_C
 
 void ramp_divide_k(wide_t *quotient, const wide_t *k2_q16, uint32_t divisor)
@@ -335,19 +328,10 @@ uint16_t ramp_next(ramp_t *ramp, uint16_t left, ramp_time_t *sum, block_t *block
         ramp->rest = false;
     if (block->runs)
         ramp->run_pulses = block->pulses;
-    set_time(sum, &group.sum_q16);
+    wide_copy(&sum->q16, &group.sum_q16);
     return pulses;
 }
 #endif
-
-ramp_time_t ramp_interval(const ramp_constants_t *constants, uint32_t v)
-{
-    wide_t q16;
-    ramp_interval_q16(&q16, constants, v);
-    ramp_time_t time;
-    set_time(&time, &q16);
-    return time;
-}
 
 NOINLINE uint32_t ramp_velocity(const ramp_constants_t *constants, uint32_t ticks)
 {

@@ -22,9 +22,13 @@
 #include "base/wide.h"
 #include "motion/block.h"
 
-typedef struct {
-    uint16_t frac_q16; /* 1/65536 tick */
-    uint32_t ticks;
+/* An interval, or the sum of several. */
+typedef union {
+    wide_t q16; /* 1/65536 tick; below 2^48 */
+    struct __attribute__((packed)) {
+        uint16_t frac_q16;
+        uint32_t ticks;
+    };
 } ramp_time_t;
 
 /* What ramps depend on: motor and clock. */
@@ -69,9 +73,8 @@ typedef struct {
 /* steps_per_rev >= 8; clock_hz 400,000..16,000,000 */
 void ramp_constants(ramp_constants_t *constants, uint16_t steps_per_rev, uint32_t clock_hz);
 
-/* Interval at a velocity, in 1/65536 tick and as a time. v >= 1. */
+/* Interval at a velocity, in 1/65536 tick. v >= 1. */
 void ramp_interval_q16(wide_t *q16, const ramp_constants_t *constants, uint32_t v);
-ramp_time_t ramp_interval(const ramp_constants_t *constants, uint32_t v);
 
 /* Velocity of an interval in ticks: the inverse. ticks >= 1. */
 uint32_t ramp_velocity(const ramp_constants_t *constants, uint32_t ticks);

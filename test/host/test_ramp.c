@@ -96,6 +96,13 @@ static void begin(const case_t *c)
     ramp_begin(&ramp, &constants, wide_root(&v2) + 1, c->pulses);
 }
 
+static ramp_time_t interval_at(uint32_t v)
+{
+    ramp_time_t t;
+    ramp_interval_q16(&t.q16, &constants, v);
+    return t;
+}
+
 /* As many as ramp_next() takes. */
 static uint16_t few(uint32_t pulses)
 {
@@ -167,7 +174,7 @@ static void test_constants_follow_the_clock(void)
         TEST_ASSERT_EQUAL_UINT32(clock.hz, constants.clock_hz);
         TEST_ASSERT_EQUAL_UINT8(clock.cycles_log2, constants.cycles_log2);
         TEST_ASSERT_EQUAL_UINT8(clock.cycles_log2 ? 0 : BLOCK_SPLIT_TICKS, constants.split_ticks);
-        ramp_time_t t = ramp_interval(&constants, 7000); /* 70 RPM: 30 ms / 7 */
+        ramp_time_t t = interval_at(7000); /* 70 RPM: 30 ms / 7 */
         uint64_t q16 = ((uint64_t)clock.hz * 3u << 16) / 700u;
         TEST_ASSERT_EQUAL_UINT32((uint32_t)(q16 >> 16), t.ticks);
         TEST_ASSERT_UINT32_WITHIN(1, (uint16_t)q16, t.frac_q16);
@@ -220,12 +227,12 @@ static void test_the_runs_of_a_group_add_up_to_it(void)
 /* HAR-010, HAR-011, SLO-001 */
 static void test_the_interval_at_a_speed_is_300000_us_by_rpm(void)
 {
-    ramp_time_t t = ramp_interval(&constants, 1000);
+    ramp_time_t t = interval_at(1000);
     TEST_ASSERT_EQUAL_UINT32(480000, t.ticks);
     TEST_ASSERT_EQUAL_UINT16(0, t.frac_q16);
-    t = ramp_interval(&constants, 15000); /* 150 RPM: 2000 us */
+    t = interval_at(15000); /* 150 RPM: 2000 us */
     TEST_ASSERT_EQUAL_UINT32(32000, t.ticks);
-    t = ramp_interval(&constants, 7000); /* 70 RPM: 4285.714 us = 68571.43 ticks */
+    t = interval_at(7000); /* 70 RPM: 4285.714 us = 68571.43 ticks */
     TEST_ASSERT_EQUAL_UINT32(68571, t.ticks);
     TEST_ASSERT_UINT32_WITHIN(1, 110, t.frac_q16 >> 8);
 }
@@ -233,7 +240,7 @@ static void test_the_interval_at_a_speed_is_300000_us_by_rpm(void)
 static void test_speed_and_interval_are_each_others_inverse(void)
 {
     for (uint32_t v = 1000; v < 15000000; v += v / 7) {
-        ramp_time_t t = ramp_interval(&constants, v);
+        ramp_time_t t = interval_at(v);
         uint32_t back = ramp_velocity(&constants, t.ticks + (t.frac_q16 >= 32768));
         /* Half a tick and the 24 bits of a float. */
         TEST_ASSERT_UINT32_WITHIN(1 + v / t.ticks + (v >> 22), v, back);
