@@ -1249,6 +1249,8 @@ static NOINLINE uint8_t play_on(void)
                 expire_gap();
         }
     }
+    if (engine.next && engine.playing && !engine.single && engine.stage > STAGE_TAIL)
+        join_next();
     /* Until the ring is three quarters full nothing else is as urgent, within reason; then a step at a time. (A timer that
      * has run out of segments is started again as soon as there is one.) */
     uint8_t rounds = 6;
@@ -1260,8 +1262,6 @@ static NOINLINE uint8_t play_on(void)
                 break;
             worked = 1;
         } while (ring_free() > SEGMENT_COUNT / 4 * SEGMENT_BYTES && !step_idle && --rounds);
-        if (engine.next && !engine.single && engine.stage > STAGE_TAIL)
-            join_next();
     }
     return worked;
 }
