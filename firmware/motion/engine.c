@@ -33,6 +33,7 @@
 #define GEAR_CYCLES 1600u        /* with auto-micro: no pulses nearer than these, if larger steps can help it */
 #define HOLD_LEAST 64u           /* pulses that may be repeated if the ring runs empty; with fewer, more are allowed */
 #define RING_REFILL (12u * SEGMENT_BYTES) /* free segments for a block to be gone on with, while no command waits */
+#define RING_REFILL_SINGLE (8u * SEGMENT_BYTES) /* ... where each of them is one pulse: a full ring is soon played */
 #define RING_RESERVE (4u * SEGMENT_BYTES) /* segments that one step of emission may need */
 
 /* What comes next of the command being emitted. */
@@ -1257,7 +1258,9 @@ static NOINLINE uint8_t play_on(void)
     if (engine.playing) {
         do {
             /* A command that waits is joined as soon as this one is in the ring: as far ahead of its end as it can be. */
-            uint8_t least = block.runs && !engine.next ? RING_REFILL : RING_RESERVE;
+            uint8_t least = RING_RESERVE;
+            if (block.runs && !engine.next)
+                least = block.pulses == 1 ? RING_REFILL_SINGLE : RING_REFILL;
             if (ring_free() < least || !emit())
                 break;
             worked = 1;
