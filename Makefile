@@ -40,7 +40,8 @@ FIRMWARE_SRCS := \
     firmware/hal/encoder_isr.S \
     firmware/hal/start.S \
     firmware/hal/timebase_isr.S \
-    firmware/hal/usart_isr.S \
+    firmware/hal/usart_receive.S \
+    firmware/hal/usart_transmit.S \
     firmware/hal/soft_uart_isr.S \
     firmware/motion/ramp.c \
     firmware/motion/ramp.S \
