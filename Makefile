@@ -154,7 +154,7 @@ IMAGE_COMMON_SRCS := test/image/image.c test/image/model.c
 test_image_fuzz_SRCS := test/fuzz/grammar.c test/fuzz/reference.c firmware/settings.c
 
 # Tests written in Python.
-SCRIPT_TESTS := test/tools/test_tools.py test/sim/test_sacsim.py
+SCRIPT_TESTS := test/tools/test_tools.py test/sim/test_sacsim.py test/sim/test_ninjasim.py
 
 # Checks that count as one test each.
 CHECKS := \
@@ -168,6 +168,7 @@ CHECKS := \
 -include test/board/models.mk
 -include test/board/head.mk
 -include tools/sacsim/sacsim.mk
+-include tools/ninjasim/ninjasim.mk
 -include test/bench/bench.mk
 
 # -- firmware --------------------------------------------------------------------------------------------------------
@@ -289,8 +290,9 @@ $(BOARD_LIB): $(BOARD_OBJS)
 	$(Q)ar rcs $@ $^
 
 SACSIM_OBJS := $(SACSIM_SRCS:%.c=$(BUILD)/%.o)
+NINJASIM_OBJS := $(NINJASIM_SRCS:%.c=$(BUILD)/%.o)
 
-$(SACSIM_OBJS): $(BUILD)/%.o: %.c $(HOST_HEADERS) Makefile
+$(sort $(SACSIM_OBJS) $(NINJASIM_OBJS)): $(BUILD)/%.o: %.c $(HOST_HEADERS) Makefile
 	@mkdir -p $(@D)
 	$(call say,CC  $@)
 	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O2 $(SACSIM_CPPFLAGS) -c -o $@ $<
@@ -302,6 +304,14 @@ $(BUILD)/sacsim: $(SACSIM_OBJS) $(BOARD_LIB)
 .PHONY: sim
 sim: $(BUILD)/sacsim $(BUILD)/sac.elf ## type at a simulated Nano; SIM='--help' lists its options
 	@$(BUILD)/sacsim $(SIM) $(BUILD)/sac.elf
+
+$(BUILD)/ninjasim: $(NINJASIM_OBJS) $(BOARD_LIB)
+	$(call say,LD  $@)
+	$(Q)$(HOST_CC) $(BOARD_LDFLAGS) -o $@ $^ $(BOARD_LIBS) $(NINJASIM_LDLIBS)
+
+.PHONY: ninja
+ninja: $(BUILD)/ninjasim $(BUILD)/ninja.elf ## steer a simulated pan and tilt head; SIM='--help' lists its options
+	@$(BUILD)/ninjasim $(SIM) $(BUILD)/ninja.elf
 
 $(BUILD)/bench: $(BENCH_SRCS) $(BOARD_LIB) $(HOST_HEADERS)
 	$(call say,LD  $@)
@@ -384,7 +394,7 @@ $(IMAGE_BINS): $(BUILD)/image/%: test/image/%.c $(IMAGE_COMMON_SRCS) $$($$*_SRCS
 HOST_PARTS := $(HOST_BINS) $(BUILD)/host/bus_node.so
 BOARD_PARTS := $(BOARD_BINS) $(BOARD_IMAGES)
 IMAGE_PARTS := $(IMAGE_BINS) $(BUILD)/sac.hex
-SIM_PARTS := $(BUILD)/sacsim $(BUILD)/sac.elf
+SIM_PARTS := $(BUILD)/sacsim $(BUILD)/sac.elf $(BUILD)/ninjasim
 AVR_PARTS := $(if $(AVR_TESTS),$(AVR_IMAGES) $(BUILD)/avr/run)
 
 .PHONY: test-parts
@@ -397,7 +407,7 @@ test_runs = $(foreach run,$(1),--tests $(run))
 AVR_RUNS = $(foreach run,$(AVR_TESTS),--tests '$(BUILD)/avr/run $(BUILD)/avr/$(run).elf')
 # For scripts that may run in another folder.
 AVR_PATH := $(if $(findstring /,$(AVR)),$(abspath $(AVR)),$(AVR))
-TEST_ENV := env BUILD=$(BUILD) SACSIM=$(BUILD)/sacsim SAC_ELF=$(BUILD)/sac.elf AVR=$(AVR_PATH)
+TEST_ENV := env BUILD=$(BUILD) SACSIM=$(BUILD)/sacsim NINJASIM=$(BUILD)/ninjasim SAC_ELF=$(BUILD)/sac.elf AVR=$(AVR_PATH)
 SCRIPT_RUNS = $(foreach run,$(SCRIPT_TESTS),--tests '$(TEST_ENV) $(PYTHON) $(run)')
 
 .PHONY: test
