@@ -117,7 +117,7 @@ NINJA_SRCS := \
 HOST_TESTS := test_number test_status test_baud test_line test_settings test_store test_session test_queue \
     test_encoder test_ops test_motion_syntax test_commands test_configure test_display test_trial test_terminal test_packet test_network \
     test_bus_nodes test_fuzz test_boot test_drivers test_wide test_block test_group test_ramp test_ramp_next test_profile test_engine \
-    test_property_planner test_processor_model
+    test_property_planner test_processor_model test_ninja_commands test_ninja_path test_ninja_centre test_ninja_constants
 FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 STORE_SRCS := firmware/eeprom/store.c firmware/base/crc16.c firmware/settings.c test/host/fakes/eeprom_port_fake.c
 NET_SRCS := firmware/net/packet.c firmware/net/bus.c test/host/fakes/bus_port_fake.c
@@ -162,6 +162,16 @@ ENGINE_SRCS := firmware/drivers.c firmware/motion/engine.c firmware/motion/block
 test_engine_SRCS := $(ENGINE_SRCS)
 test_processor_model_SRCS := test/image/processor_model.c
 test_property_planner_SRCS := $(ENGINE_SRCS) test/host/motion_exact.c
+NINJA_PATH_SRCS := firmware/ninja/path.c firmware/ninja/drive.c firmware/motion/profile.c $(RAMP_SRCS)
+NINJA_HEAD_SRCS := $(NINJA_PATH_SRCS) firmware/ninja/commands.c firmware/ninja/centre.c firmware/ninja/pause.c firmware/base/number.c
+NINJA_HEAD_HOST_SRCS := test/host/fakes/head_fake.c test/host/fakes/head_firmware.c test/host/fakes/timebase_port_fake.c
+test_ninja_path_SRCS := $(NINJA_PATH_SRCS)
+test_ninja_path_HOST_SRCS := test/host/fakes/head_fake.c
+test_ninja_centre_SRCS := $(NINJA_PATH_SRCS) firmware/ninja/centre.c
+test_ninja_centre_HOST_SRCS := test/host/fakes/head_fake.c
+test_ninja_commands_SRCS := $(NINJA_HEAD_SRCS)
+test_ninja_commands_HOST_SRCS := $(NINJA_HEAD_HOST_SRCS)
+test_ninja_constants_SRCS := firmware/motion/profile.c $(RAMP_SRCS)
 
 # Arithmetic that is tested on the AVR as well: the same source, compiled by avr-gcc, run on the simulated board.
 AVR_TESTS := test_number test_line test_session test_wide test_block test_group test_ramp test_ramp_next test_profile
