@@ -348,11 +348,11 @@ class Firmware(unittest.TestCase):
                 self.assertEqual(self.moves(b"", "--start=" + start), (0, 0))
 
     def test_moves_end_where_they_are_sent(self):
-        self.assertEqual(self.moves(b"X100Y50S "), (100, 50))
+        self.assertEqual(self.moves(b"X100Y50S"), (100, 50))
         self.assertEqual(self.moves(b"X-900Y-70V40M\nX5000Y5000S\nX-300Y-40I\n", "--wait"), (1500, 510))
 
     def test_macro_runs(self):
-        self.assertEqual(self.moves(b"(X40Y-40S\nX0Y0S\nX-7S)R ", "--wait"), (-7, 0))
+        self.assertEqual(self.moves(b"(X40Y-40S\nX0Y0S\nX-7S)R", "--wait"), (-7, 0))
 
     def test_another_backlash_than_expected_is_seen(self):
         self.assertNotEqual(self.moves(b"X100S\nX0S\n", "--wait", "--backlash", "40,6"), (0, 0))
@@ -366,7 +366,7 @@ class Firmware(unittest.TestCase):
     def test_at_the_terminal(self):
         with Screen("--start", "20,-20", image=FIRMWARE) as s:
             s.await_text(r"X +0 steps(.|\n)*Y +0 steps")
-            s.send(b"X-200Y100S ")
+            s.send(b"X-200Y100S")
             s.await_text(r"X +-200 steps +-20.0 deg +coils ----(.|\n)*Y +100 steps +10.0 deg +coils ----")
 
 

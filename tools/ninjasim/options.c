@@ -20,7 +20,7 @@ static const char doc[] =
     "With --script, or where the input is a pipe or a file, nothing is drawn: the bytes are typed once the head rests after "
     "power-up, and when they are used up and it rests again one line tells how it stands:\n"
     "\n"
-    "  printf 'X100Y50S ' | ninjasim --fast build/ninja.elf\n"
+    "  printf 'X100Y50S' | ninjasim --fast build/ninja.elf\n"
     "\n"
     "Exit code: 0 done; 1 a file, a terminal or the image cannot be used; 2 wrong command line; 3 the firmware crashed. "
     "docs/simulator.md tells more.";
