@@ -171,7 +171,7 @@ test_ninja_centre_SRCS := $(NINJA_PATH_SRCS) firmware/ninja/centre.c
 test_ninja_centre_HOST_SRCS := test/host/fakes/head_fake.c
 test_ninja_commands_SRCS := $(NINJA_HEAD_SRCS)
 test_ninja_commands_HOST_SRCS := $(NINJA_HEAD_HOST_SRCS)
-test_ninja_constants_SRCS := firmware/motion/profile.c $(RAMP_SRCS)
+test_ninja_constants_SRCS := $(filter-out %/drive.c,$(NINJA_PATH_SRCS))
 
 # Arithmetic that is tested on the AVR as well: the same source, compiled by avr-gcc, run on the simulated board.
 AVR_TESTS := test_number test_line test_session test_wide test_block test_group test_ramp test_ramp_next test_profile
@@ -393,6 +393,9 @@ $(HOST_BINS): $(BUILD)/host/%: test/host/%.c $$($$*_SRCS) $$($$*_HOST_SRCS) $(BU
 	$(call say,CC  $@)
 	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O1 $(UNITY_FLAGS) $(SANITIZE) $(TEST_INCLUDES) -o $@ $(filter %.c %.o,$^) -lm
 
+$(BUILD)/host/test_ninja_constants: HOST_CFLAGS += -DNINJA_BACKLASH_X=0 -DNINJA_BACKLASH_Y=0 -DNINJA_ACCELERATION=400 \
+    -DNINJA_START_STEPS_PER_S=20 -DNINJA_TOP_STEPS_PER_S=300
+
 # The nodes of test_bus_nodes.
 BUS_NODE_FLAGS := -fPIC -shared -fvisibility=hidden
 $(BUILD)/host/test_bus_nodes: HOST_CFLAGS += -DBUS_NODE_SO='"$(BUILD)/host/bus_node.so"'
@@ -484,6 +487,11 @@ $(BUILD)/fuzz: test/host/test_fuzz.c $(test_fuzz_SRCS) $(test_fuzz_HOST_SRCS) $(
 fuzz-long: ## 10^8 damaged lines into the terminal on this machine; SAC_FUZZ_SEED=n makes others, SAC_FUZZ_LINES=n fewer
 	@$(MAKE) -s --no-print-directory $(BUILD)/fuzz
 	@SAC_FUZZ_LINES=$${SAC_FUZZ_LINES:-100000000} $(BUILD)/fuzz
+
+.PHONY: fuzz-ninja-long
+fuzz-ninja-long: ## 10^7 bytes into the Ninja's commands and macros, sanitized (minutes); NINJA_BYTES=n makes fewer, NINJA_SEED=n others
+	@$(MAKE) -s --no-print-directory $(BUILD)/host/test_ninja_commands
+	@NINJA_BYTES=$${NINJA_BYTES:-10000000} $(BUILD)/host/test_ninja_commands
 
 $(BUILD)/packets: test/host/test_packet.c $(test_packet_SRCS) $(BUILD)/unity.o $(HOST_HEADERS) Makefile
 	$(call say,CC  $@)
