@@ -192,8 +192,8 @@ static void test_a_halt_purges_everything_but_the_macro(void)
     head_say("MX9MX8MX7MX6MY5MX9");
     head_say("\b");
     TEST_ASSERT_TRUE(head_rest(2));
-    TEST_ASSERT_EQUAL(49, path_position(AXIS_X)); /* the first wait was the start interval's ... */
-    TEST_ASSERT_EQUAL(49, head_counts[AXIS_X]);
+    TEST_ASSERT_EQUAL(50, path_position(AXIS_X));
+    TEST_ASSERT_EQUAL(50, head_counts[AXIS_X]);
     TEST_ASSERT_EQUAL(0, path_position(AXIS_Y));
     leads_to("X7\b8M", 1000, 0); /* X is what it was, 8 is nothing */
     leads_to("R", 5, 0);
