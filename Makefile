@@ -21,6 +21,8 @@ JOBS ?= $(shell nproc)
 PORT ?= /dev/ttyUSB0
 BAUD ?= 115200 57600
 PROGRAMMER ?= usbasp
+# Which image is flashed: sac or ninja.
+IMAGE ?= sac
 
 Q := $(if $(V),,@)
 say = $(if $(V)$(findstring s,$(firstword -$(MAKEFLAGS))),,@echo '  $(1)')
@@ -572,7 +574,7 @@ crosscheck: ## the image in avr8js: the edges of clk compared with the board's (
 
 # A Nano's bootloader listens at 115200 bits/s, older ones at 57600: whichever answers.
 .PHONY: flash
-flash: $(BUILD)/sac.hex ## flash a Nano: PORT=/dev/ttyUSB0, if need be BAUD=57600 or 115200
+flash: $(BUILD)/$(IMAGE).hex ## flash a Nano: PORT=/dev/ttyUSB0, if need be BAUD=57600 or 115200; IMAGE=ninja: the Ninja
 	@for baud in $(BAUD); do \
 	    echo "avrdude at $$baud bits/s"; \
 	    avrdude -p atmega328p -c arduino -P $(PORT) -b $$baud -D -U flash:w:$<:i && exit 0; \
@@ -588,7 +590,7 @@ flash: $(BUILD)/sac.hex ## flash a Nano: PORT=/dev/ttyUSB0, if need be BAUD=5760
 FUSES := -U lfuse:w:0xF7:m -U hfuse:w:0xD1:m -U efuse:w:0xFC:m
 
 .PHONY: flash-isp
-flash-isp: $(BUILD)/sac.hex ## flash and set the fuses with an ISP programmer: PROGRAMMER=usbasp
+flash-isp: $(BUILD)/$(IMAGE).hex ## flash and set the fuses with an ISP programmer: PROGRAMMER=usbasp
 	avrdude -p atmega328p -c $(PROGRAMMER) $(FUSES)
 	avrdude -p atmega328p -c $(PROGRAMMER) -U flash:w:$<:i
 
