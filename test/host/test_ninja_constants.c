@@ -1,11 +1,6 @@
-/* ninja/path with other build constants: no backlash at all, a slow acceleration, other velocities. */
-#define NINJA_BACKLASH_X 0
-#define NINJA_BACKLASH_Y 0
-#define NINJA_ACCELERATION 400
-#define NINJA_START_STEPS_PER_S 20
-#define NINJA_TOP_STEPS_PER_S 300
-#include "ninja/path.c"
+/* ninja/path with other build constants (Makefile): no backlash at all, a slow acceleration, other velocities. */
 #include <math.h>
+#include "ninja/path.h"
 #include "unity.h"
 
 void setUp(void)
@@ -49,7 +44,8 @@ static void test_the_ramp_follows_the_constants(void)
         ticks += wait.ticks;
         TEST_ASSERT_DOUBLE_WITHIN(0.0005, sqrt(2. * k / NINJA_ACCELERATION), ticks / STEPPER_HZ);
     }
-    TEST_ASSERT_TRUE(path_next(&wait));
+    for (unsigned k = 0; k < 3; k++) /* what the ramp may lack, and on */
+        TEST_ASSERT_TRUE(path_next(&wait));
     TEST_ASSERT_EQUAL(2 * PATH_CYCLE_US(NINJA_TOP_STEPS_PER_S), wait.ticks);
 }
 

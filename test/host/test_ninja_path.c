@@ -67,6 +67,8 @@ static void test_a_move_follows_the_law(void)
     for (unsigned k = 1; k <= ramp; k++)
         TEST_ASSERT_DOUBLE_WITHIN(0.002, 1000 * sqrt(2 * k / ACCELERATION), ms_between(1, 1 + k));
     for (unsigned k = ramp + 1; k <= 700 - ramp; k++)
+        TEST_ASSERT_DOUBLE_WITHIN(0.002, 2, ms_between(k, k + 1));
+    for (unsigned k = ramp + 3; k <= 700 - ramp - 2; k++)
         TEST_ASSERT_EQUAL_DOUBLE(2, ms_between(k, k + 1));
     for (unsigned k = 1; k <= ramp; k++) {
         double interval = 1000 * (sqrt(2 * k / ACCELERATION) - sqrt(2 * (k - 1) / ACCELERATION));
@@ -94,8 +96,8 @@ static double square(double x)
     return x * x;
 }
 
-/* NIN-031: also of moves too short for the velocity. Of v^2, 2 a a step at most: from each interval to the next ones. Where a
- * ramp of whole steps meets the cruise, it may lack a part of a step. */
+/* NIN-031: also of moves too short for the velocity. Of v^2, 2 a a step at most, from each interval to the next ones; the mean
+ * velocity of the first one is half of what it ends with, and 0.5 us are up to 0.06 of a step. */
 static void test_no_acceleration_exceeds_the_constant(void)
 {
     for (int i = 0; i < 300; i++) {
@@ -106,7 +108,7 @@ static void test_no_acceleration_exceeds_the_constant(void)
             for (unsigned e = 1; e + later + 1 < head_event_count; e++) {
                 const double v2 = square(1000 / ms_between(e, e + 1));
                 const double change = square(1000 / ms_between(e + later, e + later + 1)) - v2;
-                TEST_ASSERT_TRUE(fabs(change) < 2 * 1.02 * NINJA_ACCELERATION * (later + 0.8));
+                TEST_ASSERT_TRUE(fabs(change) < 2 * 1.02 * NINJA_ACCELERATION * (later + 0.25));
             }
         }
     }
