@@ -15,6 +15,7 @@
 #define BAUD 4800
 #define BYTE_CYCLES (10 * 16000000ull / BAUD)
 #define MOST_EVENTS 20000
+#define HALTS 300
 #define JITTER (5 * US) /* of the step interrupt, behind others */
 
 static board_t *nano;
@@ -277,9 +278,9 @@ static void test_a_pause_begins_when_motion_is_over(void)
 static void test_a_halt_takes_effect_within_an_interval(void)
 {
     home();
-    for (int i = 0; i < 40; i++) {
+    for (int i = 0; i < HALTS; i++) {
         char line[40];
-        const int v = i % 3 == 0 ? 0 : i * 63 / 39;
+        const int v = i % 5 == 0 ? 0 : i * 63 / (HALTS - 1);
         snprintf(line, sizeof line, "Y0V%dX%dM", v, i % 2 ? -300 : 300);
         say(line);
         run((50 + (uint64_t)i * 37 % 500) * MS + (uint64_t)i * 137 * US);
