@@ -10,6 +10,9 @@ DEFS ?=
 # call; that the stack fits beside it is proven (tools/check_stack.py).
 FLASH_BUDGET := 32256
 RAM_BUDGET := 1780
+# The Ninja's: it has room.
+NINJA_FLASH_BUDGET := 12288
+NINJA_RAM_BUDGET := 768
 # V=1 shows the commands.
 V ?=
 # How many jobs build and test side by side.
@@ -18,6 +21,8 @@ JOBS ?= $(shell nproc)
 PORT ?= /dev/ttyUSB0
 BAUD ?= 115200 57600
 PROGRAMMER ?= usbasp
+# Which image is flashed: sac or ninja.
+IMAGE ?= sac
 
 Q := $(if $(V),,@)
 say = $(if $(V)$(findstring s,$(firstword -$(MAKEFLAGS))),,@echo '  $(1)')
@@ -84,6 +89,29 @@ FIRMWARE_SRCS := \
     firmware/base/number.c \
     firmware/base/status.c
 
+# The Ninja's, a pan and tilt head on the same board: a second image. What is not in its folder is SAC's.
+NINJA_SRCS := \
+    firmware/hal/usart_receive.S \
+    firmware/hal/timebase_isr.S \
+    firmware/hal/timebase.c \
+    firmware/hal/sleep.c \
+    firmware/base/number.c \
+    firmware/base/wide.S \
+    firmware/motion/ramp.c \
+    firmware/motion/ramp.S \
+    firmware/motion/group.c \
+    firmware/motion/group.S \
+    firmware/motion/profile.c \
+    firmware/ninja/main.c \
+    firmware/ninja/commands.c \
+    firmware/ninja/pause.c \
+    firmware/ninja/centre.c \
+    firmware/ninja/drive.c \
+    firmware/ninja/path.c \
+    firmware/ninja/hal/stepper.c \
+    firmware/ninja/hal/receive.c \
+    firmware/ninja/hal/sensors.c
+
 # -- the tests -------------------------------------------------------------------------------------------------------
 # Host tests: test/host/<name>.c, one binary a module, with the sources that <name>_SRCS lists; <name>_HOST_SRCS are
 # needed on the host alone, and assembler on the AVR alone.
@@ -91,7 +119,7 @@ FIRMWARE_SRCS := \
 HOST_TESTS := test_number test_status test_baud test_line test_settings test_store test_session test_queue \
     test_encoder test_ops test_motion_syntax test_commands test_configure test_display test_trial test_terminal test_packet test_network \
     test_bus_nodes test_fuzz test_boot test_drivers test_wide test_block test_group test_ramp test_ramp_next test_profile test_engine \
-    test_property_planner test_processor_model
+    test_property_planner test_processor_model test_ninja_commands test_ninja_path test_ninja_centre test_ninja_constants
 FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 STORE_SRCS := firmware/eeprom/store.c firmware/base/crc16.c firmware/settings.c test/host/fakes/eeprom_port_fake.c
 NET_SRCS := firmware/net/packet.c firmware/net/bus.c test/host/fakes/bus_port_fake.c
@@ -136,15 +164,26 @@ ENGINE_SRCS := firmware/drivers.c firmware/motion/engine.c firmware/motion/block
 test_engine_SRCS := $(ENGINE_SRCS)
 test_processor_model_SRCS := test/image/processor_model.c
 test_property_planner_SRCS := $(ENGINE_SRCS) test/host/motion_exact.c
+NINJA_PATH_SRCS := firmware/ninja/path.c firmware/ninja/drive.c firmware/motion/profile.c $(RAMP_SRCS)
+NINJA_HEAD_SRCS := $(NINJA_PATH_SRCS) firmware/ninja/commands.c firmware/ninja/centre.c firmware/ninja/pause.c firmware/base/number.c
+NINJA_HEAD_HOST_SRCS := test/host/fakes/head_fake.c test/host/fakes/head_firmware.c test/host/fakes/timebase_port_fake.c
+test_ninja_path_SRCS := $(NINJA_PATH_SRCS)
+test_ninja_path_HOST_SRCS := test/host/fakes/head_fake.c
+test_ninja_centre_SRCS := $(NINJA_PATH_SRCS) firmware/ninja/centre.c
+test_ninja_centre_HOST_SRCS := test/host/fakes/head_fake.c
+test_ninja_commands_SRCS := $(NINJA_HEAD_SRCS)
+test_ninja_commands_HOST_SRCS := $(NINJA_HEAD_HOST_SRCS)
+test_ninja_constants_SRCS := $(filter-out %/drive.c,$(NINJA_PATH_SRCS))
 
 # Arithmetic that is tested on the AVR as well: the same source, compiled by avr-gcc, run on the simulated board.
 AVR_TESTS := test_number test_line test_session test_wide test_block test_group test_ramp test_ramp_next test_profile
 
-# Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
+# Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf, those of test_ninja_... build/ninja.elf.
 IMAGE_TESTS := test_image_boot test_image_pins test_image_encoder test_image_motion test_image_queue \
     test_image_sequence test_image_terminal test_image_stop test_image_configure test_image_powercut test_image_system test_image_timing test_image_clock test_image_stress \
     test_image_estop test_image_ops test_image_processor test_image_fuzz test_image_automicro test_image_manual test_image_bus \
-    test_image_network test_image_line test_image_nodes
+    test_image_network test_image_line test_image_nodes \
+    test_ninja_image
 test_image_bus_SRCS := test/image/soft_peer.c
 test_image_network_SRCS := test/image/soft_peer.c test/image/master.c
 test_image_line_SRCS := test/image/soft_peer.c test/image/master.c test/fuzz/grammar.c
@@ -155,7 +194,7 @@ IMAGE_COMMON_SRCS := test/image/image.c test/image/model.c
 test_image_fuzz_SRCS := test/fuzz/grammar.c test/fuzz/reference.c firmware/settings.c
 
 # Tests written in Python.
-SCRIPT_TESTS := test/tools/test_tools.py test/sim/test_sacsim.py
+SCRIPT_TESTS := test/tools/test_tools.py test/sim/test_sacsim.py test/sim/test_ninjasim.py
 
 # Checks that count as one test each.
 CHECKS := \
@@ -167,7 +206,9 @@ CHECKS := \
 # The board, its models, the simulator program and the benchmark list their own sources.
 -include test/board/board.mk
 -include test/board/models.mk
+-include test/board/head.mk
 -include tools/sacsim/sacsim.mk
+-include tools/ninjasim/ninjasim.mk
 -include test/bench/bench.mk
 
 # -- firmware --------------------------------------------------------------------------------------------------------
@@ -198,14 +239,19 @@ AVR_LDFLAGS := $(AVR_MCU) -Wl,--gc-sections -mrelax -nostartfiles -T firmware/im
 LINK_SCRIPTS := firmware/image.ld firmware/link_order.ld
 
 FIRMWARE_OBJS := $(FIRMWARE_SRCS:firmware/%=$(BUILD)/firmware/%.o)
+NINJA_OBJS := $(NINJA_SRCS:firmware/%=$(BUILD)/firmware/%.o)
 
 .PHONY: firmware
-firmware: $(BUILD)/sac.hex budgets ## build/sac.elf and build/sac.hex; budgets of flash, RAM and stack
+firmware: $(BUILD)/sac.hex $(BUILD)/ninja.hex budgets ## both images, build/sac.hex and build/ninja.hex; budgets of flash, RAM, stack
+
+.PHONY: ninja-firmware
+ninja-firmware: $(BUILD)/ninja.hex ninja-budgets ## build/ninja.elf and build/ninja.hex alone, and which objects they share with SAC
+	@echo 'shared: $(notdir $(basename $(filter $(FIRMWARE_OBJS),$(NINJA_OBJS))))'
 
 # Rewritten only when it changes; every object depends on it. Several makes may look at it at the same time.
 $(BUILD)/firmware/flags: FORCE
 	@mkdir -p $(@D)
-	@echo '$(AVR) $(AVR_CFLAGS) $(AVR_LDFLAGS) $(DEFS) $(FIRMWARE_SRCS) $(foreach s,$(FIRMWARE_SRCS),$(SMALLER_$s)) $(TIMED)' >$@.$$$$ && \
+	@echo '$(AVR) $(AVR_CFLAGS) $(AVR_LDFLAGS) $(DEFS) $(FIRMWARE_SRCS) $(NINJA_SRCS) $(foreach s,$(FIRMWARE_SRCS),$(SMALLER_$s)) $(TIMED)' >$@.$$$$ && \
 	    if cmp -s $@.$$$$ $@; then rm $@.$$$$; else mv $@.$$$$ $@; fi
 
 # The tables with texts, packed: the compiler finds them before those in firmware/.
@@ -242,7 +288,12 @@ $(BUILD)/sac.elf: $(FIRMWARE_OBJS) $(LINK_SCRIPTS) $(BUILD)/firmware/flags $(OUT
 	$(call say,LD  $@)
 	$(Q)$(AVR)gcc -B$(dir $(OUTLINE)) $(AVR_CFLAGS) $(AVR_LDFLAGS) -Wl,-Map=$(BUILD)/sac.map -o $@ $(FIRMWARE_OBJS)
 
-$(BUILD)/sac.hex: $(BUILD)/sac.elf
+# With the C library's start-up code and the linker's own script: there is room for both.
+$(BUILD)/ninja.elf: $(NINJA_OBJS) $(BUILD)/firmware/flags
+	$(call say,LD  $@)
+	$(Q)$(AVR)gcc $(AVR_CFLAGS) -Wl,--gc-sections -mrelax -Wl,-Map=$(BUILD)/ninja.map -o $@ $(NINJA_OBJS)
+
+$(BUILD)/%.hex: $(BUILD)/%.elf
 	$(call say,HEX $@)
 	$(Q)$(AVR)objcopy -O ihex -j .text -j .data $< $@
 
@@ -252,11 +303,16 @@ link-order: $(BUILD)/sac.elf ## find the order of the functions with the most sh
 	@$(MAKE) -s --no-print-directory firmware
 
 .PHONY: budgets
-budgets: $(BUILD)/sac.elf
+budgets: $(BUILD)/sac.elf ninja-budgets
 	@$(PYTHON) tools/check_size.py $< --size $(AVR)size --flash-budget $(FLASH_BUDGET) --ram-budget $(RAM_BUDGET)
 	@$(PYTHON) tools/check_stack.py $< --su $(BUILD)/firmware --prefix $(AVR)
 
--include $(FIRMWARE_OBJS:.o=.d)
+.PHONY: ninja-budgets
+ninja-budgets: $(BUILD)/ninja.elf
+	@$(PYTHON) tools/check_size.py $< --size $(AVR)size --flash-budget $(NINJA_FLASH_BUDGET) --ram-budget $(NINJA_RAM_BUDGET)
+	@$(PYTHON) tools/check_stack.py $< --su $(BUILD)/firmware/ninja --prefix $(AVR)
+
+-include $(sort $(FIRMWARE_OBJS:.o=.d) $(NINJA_OBJS:.o=.d))
 
 .PHONY: newer
 newer: ## the same sources with the newer avr-gcc (14.2): no warning, and what it makes fits the chip, without a bootloader
@@ -271,7 +327,7 @@ endif
 
 HOST_WARNINGS := -Wall -Wextra -Wconversion -Wshadow -Wstrict-prototypes -Werror
 HOST_CFLAGS := -std=gnu11 -g $(HOST_WARNINGS)
-HOST_HEADERS := $(wildcard firmware/*.h firmware/*/*.h firmware/*/*.def test/*.h test/*/*.h test/*/*/*.h tools/*/*.h)
+HOST_HEADERS := $(wildcard firmware/*.h firmware/*/*.h firmware/*/*/*.h firmware/*/*.def test/*.h test/*/*.h test/*/*/*.h tools/*/*.h)
 SANITIZE := -fsanitize=address,undefined -fno-sanitize-recover=all
 UNITY_FLAGS := -DUNITY_INCLUDE_DOUBLE -DUNITY_SUPPORT_64
 BOARD_OBJS := $(BOARD_SRCS:%.c=$(BUILD)/%.o)
@@ -288,8 +344,9 @@ $(BOARD_LIB): $(BOARD_OBJS)
 	$(Q)ar rcs $@ $^
 
 SACSIM_OBJS := $(SACSIM_SRCS:%.c=$(BUILD)/%.o)
+NINJASIM_OBJS := $(NINJASIM_SRCS:%.c=$(BUILD)/%.o)
 
-$(SACSIM_OBJS): $(BUILD)/%.o: %.c $(HOST_HEADERS) Makefile
+$(sort $(SACSIM_OBJS) $(NINJASIM_OBJS)): $(BUILD)/%.o: %.c $(HOST_HEADERS) Makefile
 	@mkdir -p $(@D)
 	$(call say,CC  $@)
 	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O2 $(SACSIM_CPPFLAGS) -c -o $@ $<
@@ -301,6 +358,14 @@ $(BUILD)/sacsim: $(SACSIM_OBJS) $(BOARD_LIB)
 .PHONY: sim
 sim: $(BUILD)/sacsim $(BUILD)/sac.elf ## type at a simulated Nano; SIM='--help' lists its options
 	@$(BUILD)/sacsim $(SIM) $(BUILD)/sac.elf
+
+$(BUILD)/ninjasim: $(NINJASIM_OBJS) $(BOARD_LIB)
+	$(call say,LD  $@)
+	$(Q)$(HOST_CC) $(BOARD_LDFLAGS) -o $@ $^ $(BOARD_LIBS) $(NINJASIM_LDLIBS)
+
+.PHONY: ninja
+ninja: $(BUILD)/ninjasim $(BUILD)/ninja.elf ## steer a simulated pan and tilt head; SIM='--help' lists its options
+	@$(BUILD)/ninjasim $(SIM) $(BUILD)/ninja.elf
 
 $(BUILD)/bench: $(BENCH_SRCS) $(BOARD_LIB) $(HOST_HEADERS)
 	$(call say,LD  $@)
@@ -316,7 +381,7 @@ bench: $(BUILD)/bench $(BUILD)/sac.elf ## measure the image on the board; writes
 TEST_INCLUDES := -isystem $(UNITY) -Itest -Ifirmware -Itest/host -Itest/host/fakes
 
 # Where the tests find what they load.
-TEST_PATHS := -DBOARD_PROGRAMS_DIR='"$(BUILD)/board/programs"' -DSAC_ELF='"$(BUILD)/sac.elf"'
+TEST_PATHS := -DBOARD_PROGRAMS_DIR='"$(BUILD)/board/programs"' -DSAC_ELF='"$(BUILD)/sac.elf"' -DNINJA_ELF='"$(BUILD)/ninja.elf"'
 
 HOST_BINS := $(HOST_TESTS:%=$(BUILD)/host/%)
 AVR_IMAGES := $(AVR_TESTS:%=$(BUILD)/avr/%.elf)
@@ -339,6 +404,9 @@ $(HOST_BINS): $(BUILD)/host/%: test/host/%.c $$($$*_SRCS) $$($$*_HOST_SRCS) $(BU
 	@mkdir -p $(@D)
 	$(call say,CC  $@)
 	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O1 $(UNITY_FLAGS) $(SANITIZE) $(TEST_INCLUDES) -o $@ $(filter %.c %.o,$^) -lm
+
+$(BUILD)/host/test_ninja_constants: HOST_CFLAGS += -DNINJA_BACKLASH_X=0 -DNINJA_BACKLASH_Y=0 -DNINJA_ACCELERATION=400 \
+    -DNINJA_START_STEPS_PER_S=20 -DNINJA_TOP_STEPS_PER_S=300
 
 # The nodes of test_bus_nodes.
 BUS_NODE_FLAGS := -fPIC -shared -fvisibility=hidden
@@ -382,8 +450,8 @@ $(IMAGE_BINS): $(BUILD)/image/%: test/image/%.c $(IMAGE_COMMON_SRCS) $$($$*_SRCS
 
 HOST_PARTS := $(HOST_BINS) $(BUILD)/host/bus_node.so
 BOARD_PARTS := $(BOARD_BINS) $(BOARD_IMAGES)
-IMAGE_PARTS := $(IMAGE_BINS) $(BUILD)/sac.hex
-SIM_PARTS := $(BUILD)/sacsim $(BUILD)/sac.elf
+IMAGE_PARTS := $(IMAGE_BINS) $(BUILD)/sac.hex $(BUILD)/ninja.hex
+SIM_PARTS := $(BUILD)/sacsim $(BUILD)/sac.elf $(BUILD)/ninjasim $(BUILD)/ninja.elf
 AVR_PARTS := $(if $(AVR_TESTS),$(AVR_IMAGES) $(BUILD)/avr/run)
 
 .PHONY: test-parts
@@ -396,7 +464,7 @@ test_runs = $(foreach run,$(1),--tests $(run))
 AVR_RUNS = $(foreach run,$(AVR_TESTS),--tests '$(BUILD)/avr/run $(BUILD)/avr/$(run).elf')
 # For scripts that may run in another folder.
 AVR_PATH := $(if $(findstring /,$(AVR)),$(abspath $(AVR)),$(AVR))
-TEST_ENV := env BUILD=$(BUILD) SACSIM=$(BUILD)/sacsim SAC_ELF=$(BUILD)/sac.elf AVR=$(AVR_PATH)
+TEST_ENV := env BUILD=$(BUILD) SACSIM=$(BUILD)/sacsim NINJASIM=$(BUILD)/ninjasim SAC_ELF=$(BUILD)/sac.elf NINJA_ELF=$(BUILD)/ninja.elf AVR=$(AVR_PATH)
 SCRIPT_RUNS = $(foreach run,$(SCRIPT_TESTS),--tests '$(TEST_ENV) $(PYTHON) $(run)')
 
 .PHONY: test
@@ -431,6 +499,11 @@ $(BUILD)/fuzz: test/host/test_fuzz.c $(test_fuzz_SRCS) $(test_fuzz_HOST_SRCS) $(
 fuzz-long: ## 10^8 damaged lines into the terminal on this machine; SAC_FUZZ_SEED=n makes others, SAC_FUZZ_LINES=n fewer
 	@$(MAKE) -s --no-print-directory $(BUILD)/fuzz
 	@SAC_FUZZ_LINES=$${SAC_FUZZ_LINES:-100000000} $(BUILD)/fuzz
+
+.PHONY: fuzz-ninja-long
+fuzz-ninja-long: ## 10^7 bytes into the Ninja's commands and macros, sanitized (minutes); NINJA_BYTES=n makes fewer, NINJA_SEED=n others
+	@$(MAKE) -s --no-print-directory $(BUILD)/host/test_ninja_commands
+	@NINJA_BYTES=$${NINJA_BYTES:-10000000} $(BUILD)/host/test_ninja_commands
 
 $(BUILD)/packets: test/host/test_packet.c $(test_packet_SRCS) $(BUILD)/unity.o $(HOST_HEADERS) Makefile
 	$(call say,CC  $@)
@@ -511,7 +584,7 @@ crosscheck: ## the image in avr8js: the edges of clk compared with the board's (
 
 # A Nano's bootloader listens at 115200 bits/s, older ones at 57600: whichever answers.
 .PHONY: flash
-flash: $(BUILD)/sac.hex ## flash a Nano: PORT=/dev/ttyUSB0, if need be BAUD=57600 or 115200
+flash: $(BUILD)/$(IMAGE).hex ## flash a Nano: PORT=/dev/ttyUSB0, if need be BAUD=57600 or 115200; IMAGE=ninja: the Ninja
 	@for baud in $(BAUD); do \
 	    echo "avrdude at $$baud bits/s"; \
 	    avrdude -p atmega328p -c arduino -P $(PORT) -b $$baud -D -U flash:w:$<:i && exit 0; \
@@ -527,7 +600,7 @@ flash: $(BUILD)/sac.hex ## flash a Nano: PORT=/dev/ttyUSB0, if need be BAUD=5760
 FUSES := -U lfuse:w:0xF7:m -U hfuse:w:0xD1:m -U efuse:w:0xFC:m
 
 .PHONY: flash-isp
-flash-isp: $(BUILD)/sac.hex ## flash and set the fuses with an ISP programmer: PROGRAMMER=usbasp
+flash-isp: $(BUILD)/$(IMAGE).hex ## flash and set the fuses with an ISP programmer: PROGRAMMER=usbasp
 	avrdude -p atmega328p -c $(PROGRAMMER) $(FUSES)
 	avrdude -p atmega328p -c $(PROGRAMMER) -U flash:w:$<:i
 
