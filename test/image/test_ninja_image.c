@@ -229,6 +229,36 @@ static void test_a_sensor_that_never_changes_is_given_up(void)
     }
 }
 
+/* -- the line ------------------------------------------------------------------------------------------------------ */
+
+/* Of USART0 (datasheet, register summary). */
+enum { UCSR0A = 0xC0, UCSR0B = 0xC1, UCSR0C = 0xC2, UBRR0 = 0xC4, U2X = 1 << 1, TXEN = 1 << 3, RXEN = 1 << 4 };
+
+static bool transmits(board_t *b, void *ctx)
+{
+    (void)ctx;
+    return (board_peek8(b, UCSR0B) & TXEN) != 0;
+}
+
+/* NIN-001, NIN-002: 4,800 Bd within 0.1 %, 8N1; the transmitter is off at any moment */
+static void test_the_line_is_only_listened_to(void)
+{
+    home();
+    const unsigned samples = board_peek8(nano, UCSR0A) & U2X ? 8 : 16;
+    TEST_ASSERT_DOUBLE_WITHIN(4.8, 4800, 16e6 / samples / (board_peek16(nano, UBRR0) + 1));
+    TEST_ASSERT_EQUAL_HEX8(0x06, board_peek8(nano, UCSR0C));
+    TEST_ASSERT_EQUAL_HEX8(RXEN, board_peek8(nano, UCSR0B) & (RXEN | TXEN));
+    board_uart_send_text(nano, "X10Y10M?\r\b");
+    TEST_ASSERT_EQUAL(BOARD_RAN, board_run_until(nano, transmits, NULL, 100 * MS));
+    for (double baud = 4704; baud < 4900; baud += 192) { /* 2 % off */
+        board_uart_baud(nano, baud);
+        clear_events();
+        say("V63X20Y20MX0Y0M");
+        rest(5 * SECOND);
+        TEST_ASSERT_EQUAL(2, count_of(AXIS_X, ON));
+    }
+}
+
 /* -- moves --------------------------------------------------------------------------------------------------------- */
 
 /* NIN-001, NIN-007, NIN-009, NIN-010, NIN-014, NIN-030: from the start interval to the closing one */
@@ -299,6 +329,25 @@ static void test_the_watchdog_switches_the_coils_off(void)
     run(MS); /* it boots */
 }
 
+/* NIN-012, NIN-013: each V's step in the middle of a move, within what the interrupt's latency makes of 0.5 us */
+static void test_all_velocities(void)
+{
+    home();
+    for (int v = 0; v < 64; v++) {
+        char line[40];
+        const int steps = v < 30 ? 8 : 300;
+        clear_events();
+        snprintf(line, sizeof line, "X%dV%dIX0S", steps, v);
+        say(line);
+        while (count_of(AXIS_X, OFF) == 0)
+            run(MS);
+        const size_t middle = (size_t)steps / 2;
+        assert_near(line, (uint64_t)(16e6 / (8 * pow(62.5, v / 63.0))), cycle_of(AXIS_X, UP, middle) - cycle_of(AXIS_X, UP, middle - 1),
+                    JITTER);
+        rest(5 * SECOND);
+    }
+}
+
 /* NIN-012: 125 ms a step are exact, and there is no drift */
 static void test_the_slowest_moves_are_even(void)
 {
@@ -364,6 +413,26 @@ static void test_a_halt_takes_effect_within_an_interval(void)
     TEST_ASSERT_EQUAL(axes[AXIS_Y].edge, axes[AXIS_Y].steps);
 }
 
+/* NIN-006, NIN-025: even if the main loop does not come round: the step interrupt sees it */
+static void test_a_halt_needs_no_main_loop(void)
+{
+    for (int i = 0; i < 2; i++) {
+        home();
+        say("X300V63M");
+        run(400 * MS);
+        board_hang(nano);
+        clear_events();
+        board_uart_send(nano, i ? "\b" : "\022", 1);
+        run(BYTE_CYCLES);
+        const size_t steps = count_of(AXIS_X, UP);
+        run(5 * MS);
+        TEST_ASSERT_EQUAL(steps, count_of(AXIS_X, UP));
+        TEST_ASSERT_TRUE(at_rest());
+        if (i == 0)
+            tearDown();
+    }
+}
+
 /* NIN-024, NIN-025, NIN-027, NIN-028 */
 static void test_a_macro_repeats_until_it_is_halted(void)
 {
@@ -394,9 +463,12 @@ int main(void)
     RUN_TEST(test_a_move_has_its_steps_and_times);
     RUN_TEST(test_a_late_planner_loses_no_step);
     RUN_TEST(test_the_watchdog_switches_the_coils_off);
+    RUN_TEST(test_all_velocities);
     RUN_TEST(test_the_slowest_moves_are_even);
     RUN_TEST(test_a_pause_begins_when_motion_is_over);
     RUN_TEST(test_a_halt_takes_effect_within_an_interval);
+    RUN_TEST(test_a_halt_needs_no_main_loop);
+    RUN_TEST(test_the_line_is_only_listened_to);
     RUN_TEST(test_a_macro_repeats_until_it_is_halted);
     return UNITY_END();
 }
