@@ -1,5 +1,5 @@
-/* NIN on the whole image: build/ninja.elf on the board. Coil patterns as edges of their pins; the head's sensors are scripted by
- * its step counts. */
+/* NIN on the whole image: build/ninja.elf on the board. Coil patterns as edges of their pins; the head's sensors are
+ * scripted by its step counts. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdarg.h>
@@ -115,7 +115,8 @@ static uint64_t cycle_of(uint8_t axis, int what, size_t which)
 static void assert_near(const char *what, uint64_t expected, uint64_t seen, uint64_t tolerance)
 {
     char text[200];
-    snprintf(text, sizeof text, "%s: expected %" PRIu64 " cycles within %" PRIu64 ", saw %" PRIu64, what, expected, tolerance, seen);
+    snprintf(text, sizeof text, "%s: expected %" PRIu64 " cycles within %" PRIu64 ", saw %" PRIu64, what, expected,
+             tolerance, seen);
     TEST_ASSERT_TRUE_MESSAGE(seen + tolerance >= expected && seen <= expected + tolerance, text);
 }
 
@@ -200,7 +201,8 @@ void tearDown(void)
 
 /* -- centring ------------------------------------------------------------------------------------------------------ */
 
-/* NIN-017, NIN-018: one axis after the other; the last step of each is the one that changes its sensor, upwards and slowly */
+/* NIN-017, NIN-018: one axis after the other; the last step of each is the one that changes its sensor, upwards and
+ * slowly */
 static void test_at_power_up_it_centres(void)
 {
     const long starts[][2] = {{-40, -30}, {40, 30}, {1700, -500}, {1, 0}};
@@ -313,7 +315,8 @@ static void test_a_late_planner_loses_no_step(void)
     const uint64_t then = board_cycle(nano);
     rest(SECOND);
     TEST_ASSERT_EQUAL(6, count_of(AXIS_X, UP));
-    assert_near("first interval", (uint64_t)(16e6 * sqrt(2.0 / NINJA_ACCELERATION)), cycle_of(AXIS_X, UP, 1) - then, MS / 4);
+    assert_near("first interval", (uint64_t)(16e6 * sqrt(2.0 / NINJA_ACCELERATION)), cycle_of(AXIS_X, UP, 1) - then,
+                MS / 4);
     TEST_ASSERT_EQUAL(1, count_of(AXIS_X, OFF));
 }
 
@@ -352,8 +355,8 @@ static void test_all_velocities(void)
         while (count_of(AXIS_X, OFF) == 0)
             run(MS);
         const size_t middle = (size_t)steps / 2;
-        assert_near(line, (uint64_t)(16e6 / (8 * pow(62.5, v / 63.0))), cycle_of(AXIS_X, UP, middle) - cycle_of(AXIS_X, UP, middle - 1),
-                    JITTER);
+        assert_near(line, (uint64_t)(16e6 / (8 * pow(62.5, v / 63.0))),
+                    cycle_of(AXIS_X, UP, middle) - cycle_of(AXIS_X, UP, middle - 1), JITTER);
         rest(5 * SECOND);
     }
 }
