@@ -17,6 +17,8 @@ _Static_assert(NINJA_START_STEPS_PER_S >= 1 && NINJA_START_STEPS_PER_S <= 255, "
 _Static_assert(NINJA_TOP_STEPS_PER_S >= NINJA_CREEP_STEPS_PER_S, "V63 is not slower than V0");
 _Static_assert(NINJA_TOP_STEPS_PER_S <= 1000 && NINJA_CREEP_STEPS_PER_S >= 8, "1..125 ms a step");
 _Static_assert(NINJA_ACCELERATION >= 10 && NINJA_ACCELERATION <= 9500, "the ramp values' range");
+_Static_assert(NINJA_X_MAX - NINJA_X_MIN + NINJA_SEARCH_MARGIN <= 10000 &&
+                   NINJA_Y_MAX - NINJA_Y_MIN + NINJA_SEARCH_MARGIN <= 10000, "16 bits, also beyond the travel");
 _Static_assert(NINJA_BACKLASH_X <= 200 && NINJA_BACKLASH_Y <= 200, "a byte");
 
 const path_limits_t path_limits[AXES] = {

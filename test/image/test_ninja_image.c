@@ -382,6 +382,31 @@ static void test_a_pause_begins_when_motion_is_over(void)
     assert_near("pause", 300 * MS, cycle_of(AXIS_X, ON, 1) - cycle_of(AXIS_X, OFF, 0), MS);
 }
 
+/* NIN-014: what a move of both axes at top speed takes of the processor */
+static void test_the_processor_has_room(void)
+{
+    enum { TIMER1_COMPA = 11 };
+    uint16_t path_next;
+    home();
+    say("X701Y-333V63M");
+    board_measures_clear(nano);
+    uint64_t longest = 0;
+    if (board_symbol(nano, "path_next", &path_next)) { /* unless the compiler has drawn it into its caller */
+        while (board_run_to_pc(nano, path_next, 100 * MS) == BOARD_MATCHED) {
+            const uint64_t begun = board_cycle(nano);
+            TEST_ASSERT_EQUAL(BOARD_MATCHED, board_run_past(nano, path_next, 100 * MS));
+            if (board_cycle(nano) - begun > longest)
+                longest = board_cycle(nano) - begun;
+        }
+    }
+    rest(5 * SECOND);
+    const board_measures_t *seen = board_measures(nano);
+    printf("step interrupt %u cycles at most, planning %" PRIu64 ", %.0f %% of the time asleep\n",
+           seen->isr[TIMER1_COMPA].cycles_max, longest, 100. * (double)seen->sleep_cycles / (double)seen->cycles);
+    TEST_ASSERT_LESS_THAN(400, seen->isr[TIMER1_COMPA].cycles_max);
+    TEST_ASSERT_LESS_THAN(2 * MS, longest); /* a step at top speed */
+}
+
 /* -- halt ---------------------------------------------------------------------------------------------------------- */
 
 /* NIN-006, NIN-025, NIN-026: at random moments of moves at random velocities, with the FIFO full */
@@ -479,6 +504,7 @@ int main(void)
     RUN_TEST(test_all_velocities);
     RUN_TEST(test_the_slowest_moves_are_even);
     RUN_TEST(test_a_pause_begins_when_motion_is_over);
+    RUN_TEST(test_the_processor_has_room);
     RUN_TEST(test_a_halt_takes_effect_within_an_interval);
     RUN_TEST(test_a_halt_needs_no_main_loop);
     RUN_TEST(test_the_line_is_only_listened_to);
