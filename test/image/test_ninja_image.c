@@ -382,6 +382,21 @@ static void test_a_pause_begins_when_motion_is_over(void)
     assert_near("pause", 300 * MS, cycle_of(AXIS_X, ON, 1) - cycle_of(AXIS_X, OFF, 0), MS);
 }
 
+/* NIN-029 */
+static void test_sensors_are_for_centring_alone(void)
+{
+    home();
+    say("X300Y-200V63M");
+    for (int i = 0; i < 200; i++) {
+        for (uint8_t axis = 0; axis < AXES; axis++)
+            axes[axis].stuck = i >> axis & 1;
+        run(5 * MS);
+    }
+    rest(5 * SECOND);
+    TEST_ASSERT_EQUAL(axes[AXIS_X].edge + 300, axes[AXIS_X].steps);
+    TEST_ASSERT_EQUAL(axes[AXIS_Y].edge - 200 - NINJA_BACKLASH_Y, axes[AXIS_Y].steps);
+}
+
 /* NIN-014: what a move of both axes at top speed takes of the processor */
 static void test_the_processor_has_room(void)
 {
@@ -504,6 +519,7 @@ int main(void)
     RUN_TEST(test_all_velocities);
     RUN_TEST(test_the_slowest_moves_are_even);
     RUN_TEST(test_a_pause_begins_when_motion_is_over);
+    RUN_TEST(test_sensors_are_for_centring_alone);
     RUN_TEST(test_the_processor_has_room);
     RUN_TEST(test_a_halt_takes_effect_within_an_interval);
     RUN_TEST(test_a_halt_needs_no_main_loop);
