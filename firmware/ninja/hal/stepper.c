@@ -31,7 +31,7 @@ static volatile uint8_t tail;  /* interrupt: where the next one is taken; equal:
 static volatile bool halted;   /* main loop sets it, start clears it */
 static uint8_t chunks;         /* interrupt: left of the present wait */
 static uint8_t action;         /* interrupt: what follows it; 0: nothing, it is a wait for the main loop */
-static uint16_t counts[AXES];  /* interrupt: steps */
+static volatile uint16_t counts[AXES]; /* interrupt: steps */
 
 static const uint8_t patterns[4] = {0x3, 0x6, 0xC, 0x9}; /* AB, BC, CD, DA */
 
