@@ -1,5 +1,5 @@
-/* NIN on the whole image: build/ninja.elf on the board. Coil patterns as edges of their pins; the head's sensors are scripted by
- * its step counts. */
+/* NIN on the whole image: build/ninja.elf on the board. Coil patterns as edges of their pins; the head's sensors are
+ * scripted by its step counts. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdarg.h>
@@ -32,6 +32,7 @@ static event_t events[MOST_EVENTS];
 static size_t event_count;
 static struct {
     uint8_t coils;
+    uint64_t changed; /* when */
     int pattern; /* the last one seen, n modulo 4 */
     long steps;  /* of the motor, since power-up */
     long edge;   /* the sensor is low from here on */
@@ -58,13 +59,16 @@ static void note(uint64_t cycle, uint8_t axis, int what)
         events[event_count++] = (event_t){cycle, axis, what};
 }
 
-/* A step changes two pins in the same cycle: what lies between is no pattern. */
+/* A step changes two pins in the same cycle: what lies between is no pattern, and does not last. */
 static void on_edge(void *ctx, board_edge_t edge)
 {
     (void)ctx;
     const uint8_t axis = edge.pin >= BOARD_PIN('D', 0) ? AXIS_X : AXIS_Y;
     const uint8_t bit = (uint8_t)(1 << (axis == AXIS_X ? edge.pin - BOARD_PIN('D', 4) : edge.pin - BOARD_PIN('C', 0)));
     const uint8_t before = axes[axis].coils;
+    if (edge.cycle != axes[axis].changed && before != 0 && pattern_of(before) < 0)
+        TEST_FAIL_MESSAGE("other than two coils were on"); /* NIN-030 */
+    axes[axis].changed = edge.cycle;
     axes[axis].coils = (uint8_t)(edge.level ? before | bit : before & ~bit);
     if (axes[axis].coils == 0) {
         note(edge.cycle, axis, OFF);
@@ -111,11 +115,17 @@ static uint64_t cycle_of(uint8_t axis, int what, size_t which)
 static void assert_near(const char *what, uint64_t expected, uint64_t seen, uint64_t tolerance)
 {
     char text[200];
-    snprintf(text, sizeof text, "%s: expected %" PRIu64 " cycles within %" PRIu64 ", saw %" PRIu64, what, expected, tolerance, seen);
+    snprintf(text, sizeof text, "%s: expected %" PRIu64 " cycles within %" PRIu64 ", saw %" PRIu64, what, expected,
+             tolerance, seen);
     TEST_ASSERT_TRUE_MESSAGE(seen + tolerance >= expected && seen <= expected + tolerance, text);
 }
 
 /* -- the head ------------------------------------------------------------------------------------------------------ */
+
+static void run(uint64_t cycles)
+{
+    TEST_ASSERT_EQUAL_MESSAGE(BOARD_RAN, board_run_for(nano, cycles), board_crash(nano));
+}
 
 static void power_on(long x_edge, long y_edge, int x_stuck, int y_stuck)
 {
@@ -126,6 +136,7 @@ static void power_on(long x_edge, long y_edge, int x_stuck, int y_stuck)
     const int stuck[AXES] = {x_stuck, y_stuck};
     for (uint8_t axis = 0; axis < AXES; axis++) {
         axes[axis].coils = 0;
+        axes[axis].changed = 0;
         axes[axis].pattern = 0;
         axes[axis].steps = 0;
         axes[axis].edge = edge[axis];
@@ -136,11 +147,6 @@ static void power_on(long x_edge, long y_edge, int x_stuck, int y_stuck)
     }
     clear_events();
     board_on_edge(nano, on_edge, NULL);
-}
-
-static void run(uint64_t cycles)
-{
-    TEST_ASSERT_EQUAL_MESSAGE(BOARD_RAN, board_run_for(nano, cycles), board_crash(nano));
 }
 
 static void say(const char *text)
@@ -181,16 +187,22 @@ void tearDown(void)
 {
     size_t count;
     board_uart_received(nano, &count);
-    const int transmitter = board_pin_level(nano, BOARD_PIN('D', 1)); /* not driven: its pull-up */
+    int pull_ups = 0;
+    for (uint8_t axis = 0; axis < AXES; axis++) {
+        board_pin_drive(nano, BOARD_PIN('B', axis), -1);
+        pull_ups += board_pin_level(nano, BOARD_PIN('B', axis));
+    }
+    pull_ups += board_pin_level(nano, BOARD_PIN('D', 1)); /* the transmitter's is not driven either */
     board_free(nano);
     nano = NULL;
     TEST_ASSERT_EQUAL_MESSAGE(0, count, "something was transmitted"); /* NIN-002 */
-    TEST_ASSERT_EQUAL(1, transmitter);
+    TEST_ASSERT_EQUAL(3, pull_ups);
 }
 
 /* -- centring ------------------------------------------------------------------------------------------------------ */
 
-/* NIN-017, NIN-018: one axis after the other; the last step of each is the one that changes its sensor, upwards and slowly */
+/* NIN-017, NIN-018: one axis after the other; the last step of each is the one that changes its sensor, upwards and
+ * slowly */
 static void test_at_power_up_it_centres(void)
 {
     const long starts[][2] = {{-40, -30}, {40, 30}, {1700, -500}, {1, 0}};
@@ -303,7 +315,8 @@ static void test_a_late_planner_loses_no_step(void)
     const uint64_t then = board_cycle(nano);
     rest(SECOND);
     TEST_ASSERT_EQUAL(6, count_of(AXIS_X, UP));
-    assert_near("first interval", (uint64_t)(16e6 * sqrt(2.0 / NINJA_ACCELERATION)), cycle_of(AXIS_X, UP, 1) - then, MS / 4);
+    assert_near("first interval", (uint64_t)(16e6 * sqrt(2.0 / NINJA_ACCELERATION)), cycle_of(AXIS_X, UP, 1) - then,
+                MS / 4);
     TEST_ASSERT_EQUAL(1, count_of(AXIS_X, OFF));
 }
 
@@ -342,8 +355,8 @@ static void test_all_velocities(void)
         while (count_of(AXIS_X, OFF) == 0)
             run(MS);
         const size_t middle = (size_t)steps / 2;
-        assert_near(line, (uint64_t)(16e6 / (8 * pow(62.5, v / 63.0))), cycle_of(AXIS_X, UP, middle) - cycle_of(AXIS_X, UP, middle - 1),
-                    JITTER);
+        assert_near(line, (uint64_t)(16e6 / (8 * pow(62.5, v / 63.0))),
+                    cycle_of(AXIS_X, UP, middle) - cycle_of(AXIS_X, UP, middle - 1), JITTER);
         rest(5 * SECOND);
     }
 }
@@ -367,6 +380,46 @@ static void test_a_pause_begins_when_motion_is_over(void)
     say("X10V63MP3X0M");
     run(5 * SECOND);
     assert_near("pause", 300 * MS, cycle_of(AXIS_X, ON, 1) - cycle_of(AXIS_X, OFF, 0), MS);
+}
+
+/* NIN-029 */
+static void test_sensors_are_for_centring_alone(void)
+{
+    home();
+    say("X300Y-200V63M");
+    for (int i = 0; i < 200; i++) {
+        for (uint8_t axis = 0; axis < AXES; axis++)
+            axes[axis].stuck = i >> axis & 1;
+        run(5 * MS);
+    }
+    rest(5 * SECOND);
+    TEST_ASSERT_EQUAL(axes[AXIS_X].edge + 300, axes[AXIS_X].steps);
+    TEST_ASSERT_EQUAL(axes[AXIS_Y].edge - 200 - NINJA_BACKLASH_Y, axes[AXIS_Y].steps);
+}
+
+/* NIN-014: what a move of both axes at top speed takes of the processor */
+static void test_the_processor_has_room(void)
+{
+    enum { TIMER1_COMPA = 11 };
+    uint16_t path_next;
+    home();
+    say("X701Y-333V63M");
+    board_measures_clear(nano);
+    uint64_t longest = 0;
+    if (board_symbol(nano, "path_next", &path_next)) { /* unless the compiler has drawn it into its caller */
+        while (board_run_to_pc(nano, path_next, 100 * MS) == BOARD_MATCHED) {
+            const uint64_t begun = board_cycle(nano);
+            TEST_ASSERT_EQUAL(BOARD_MATCHED, board_run_past(nano, path_next, 100 * MS));
+            if (board_cycle(nano) - begun > longest)
+                longest = board_cycle(nano) - begun;
+        }
+    }
+    rest(5 * SECOND);
+    const board_measures_t *seen = board_measures(nano);
+    printf("step interrupt %u cycles at most, planning %" PRIu64 ", %.0f %% of the time asleep\n",
+           seen->isr[TIMER1_COMPA].cycles_max, longest, 100. * (double)seen->sleep_cycles / (double)seen->cycles);
+    TEST_ASSERT_LESS_THAN(400, seen->isr[TIMER1_COMPA].cycles_max);
+    TEST_ASSERT_LESS_THAN(2 * MS, longest); /* a step at top speed */
 }
 
 /* -- halt ---------------------------------------------------------------------------------------------------------- */
@@ -466,6 +519,8 @@ int main(void)
     RUN_TEST(test_all_velocities);
     RUN_TEST(test_the_slowest_moves_are_even);
     RUN_TEST(test_a_pause_begins_when_motion_is_over);
+    RUN_TEST(test_sensors_are_for_centring_alone);
+    RUN_TEST(test_the_processor_has_room);
     RUN_TEST(test_a_halt_takes_effect_within_an_interval);
     RUN_TEST(test_a_halt_needs_no_main_loop);
     RUN_TEST(test_the_line_is_only_listened_to);
