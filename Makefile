@@ -10,6 +10,9 @@ DEFS ?=
 # call; that the stack fits beside it is proven (tools/check_stack.py).
 FLASH_BUDGET := 32256
 RAM_BUDGET := 1780
+# The Ninja's: it has room.
+NINJA_FLASH_BUDGET := 12288
+NINJA_RAM_BUDGET := 768
 # V=1 shows the commands.
 V ?=
 # How many jobs build and test side by side.
@@ -40,7 +43,8 @@ FIRMWARE_SRCS := \
     firmware/hal/encoder_isr.S \
     firmware/hal/start.S \
     firmware/hal/timebase_isr.S \
-    firmware/hal/usart_isr.S \
+    firmware/hal/usart_receive.S \
+    firmware/hal/usart_transmit.S \
     firmware/hal/soft_uart_isr.S \
     firmware/motion/ramp.c \
     firmware/motion/ramp.S \
@@ -82,6 +86,29 @@ FIRMWARE_SRCS := \
     firmware/base/flash.c \
     firmware/base/number.c \
     firmware/base/status.c
+
+# The Ninja's, a pan and tilt head on the same board: a second image. What is not in its folder is SAC's.
+NINJA_SRCS := \
+    firmware/hal/usart_receive.S \
+    firmware/hal/timebase_isr.S \
+    firmware/hal/timebase.c \
+    firmware/hal/sleep.c \
+    firmware/base/number.c \
+    firmware/base/wide.S \
+    firmware/motion/ramp.c \
+    firmware/motion/ramp.S \
+    firmware/motion/group.c \
+    firmware/motion/group.S \
+    firmware/motion/profile.c \
+    firmware/ninja/main.c \
+    firmware/ninja/commands.c \
+    firmware/ninja/pause.c \
+    firmware/ninja/centre.c \
+    firmware/ninja/drive.c \
+    firmware/ninja/path.c \
+    firmware/ninja/hal/stepper.c \
+    firmware/ninja/hal/receive.c \
+    firmware/ninja/hal/sensors.c
 
 # -- the tests -------------------------------------------------------------------------------------------------------
 # Host tests: test/host/<name>.c, one binary a module, with the sources that <name>_SRCS lists; <name>_HOST_SRCS are
@@ -139,11 +166,12 @@ test_property_planner_SRCS := $(ENGINE_SRCS) test/host/motion_exact.c
 # Arithmetic that is tested on the AVR as well: the same source, compiled by avr-gcc, run on the simulated board.
 AVR_TESTS := test_number test_line test_session test_wide test_block test_group test_ramp test_ramp_next test_profile
 
-# Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf.
+# Whole-image tests: test/image/<name>.c with the board; they load build/sac.elf, those of test_ninja_... build/ninja.elf.
 IMAGE_TESTS := test_image_boot test_image_pins test_image_encoder test_image_motion test_image_queue \
     test_image_sequence test_image_terminal test_image_stop test_image_configure test_image_powercut test_image_system test_image_timing test_image_clock test_image_stress \
     test_image_estop test_image_ops test_image_processor test_image_fuzz test_image_automicro test_image_manual test_image_bus \
-    test_image_network test_image_line test_image_nodes
+    test_image_network test_image_line test_image_nodes \
+    test_ninja_image
 test_image_bus_SRCS := test/image/soft_peer.c
 test_image_network_SRCS := test/image/soft_peer.c test/image/master.c
 test_image_line_SRCS := test/image/soft_peer.c test/image/master.c test/fuzz/grammar.c
@@ -197,14 +225,19 @@ AVR_LDFLAGS := $(AVR_MCU) -Wl,--gc-sections -mrelax -nostartfiles -T firmware/im
 LINK_SCRIPTS := firmware/image.ld firmware/link_order.ld
 
 FIRMWARE_OBJS := $(FIRMWARE_SRCS:firmware/%=$(BUILD)/firmware/%.o)
+NINJA_OBJS := $(NINJA_SRCS:firmware/%=$(BUILD)/firmware/%.o)
 
 .PHONY: firmware
-firmware: $(BUILD)/sac.hex budgets ## build/sac.elf and build/sac.hex; budgets of flash, RAM and stack
+firmware: $(BUILD)/sac.hex $(BUILD)/ninja.hex budgets ## both images, build/sac.hex and build/ninja.hex; budgets of flash, RAM, stack
+
+.PHONY: ninja
+ninja: $(BUILD)/ninja.hex ninja-budgets ## build/ninja.elf and build/ninja.hex alone, and which objects they share with SAC
+	@echo 'shared: $(notdir $(basename $(filter $(FIRMWARE_OBJS),$(NINJA_OBJS))))'
 
 # Rewritten only when it changes; every object depends on it. Several makes may look at it at the same time.
 $(BUILD)/firmware/flags: FORCE
 	@mkdir -p $(@D)
-	@echo '$(AVR) $(AVR_CFLAGS) $(AVR_LDFLAGS) $(DEFS) $(FIRMWARE_SRCS) $(foreach s,$(FIRMWARE_SRCS),$(SMALLER_$s)) $(TIMED)' >$@.$$$$ && \
+	@echo '$(AVR) $(AVR_CFLAGS) $(AVR_LDFLAGS) $(DEFS) $(FIRMWARE_SRCS) $(NINJA_SRCS) $(foreach s,$(FIRMWARE_SRCS),$(SMALLER_$s)) $(TIMED)' >$@.$$$$ && \
 	    if cmp -s $@.$$$$ $@; then rm $@.$$$$; else mv $@.$$$$ $@; fi
 
 # The tables with texts, packed: the compiler finds them before those in firmware/.
@@ -241,7 +274,12 @@ $(BUILD)/sac.elf: $(FIRMWARE_OBJS) $(LINK_SCRIPTS) $(BUILD)/firmware/flags $(OUT
 	$(call say,LD  $@)
 	$(Q)$(AVR)gcc -B$(dir $(OUTLINE)) $(AVR_CFLAGS) $(AVR_LDFLAGS) -Wl,-Map=$(BUILD)/sac.map -o $@ $(FIRMWARE_OBJS)
 
-$(BUILD)/sac.hex: $(BUILD)/sac.elf
+# With the C library's start-up code and the linker's own script: there is room for both.
+$(BUILD)/ninja.elf: $(NINJA_OBJS) $(BUILD)/firmware/flags
+	$(call say,LD  $@)
+	$(Q)$(AVR)gcc $(AVR_CFLAGS) -Wl,--gc-sections -mrelax -Wl,-Map=$(BUILD)/ninja.map -o $@ $(NINJA_OBJS)
+
+$(BUILD)/%.hex: $(BUILD)/%.elf
 	$(call say,HEX $@)
 	$(Q)$(AVR)objcopy -O ihex -j .text -j .data $< $@
 
@@ -251,11 +289,16 @@ link-order: $(BUILD)/sac.elf ## find the order of the functions with the most sh
 	@$(MAKE) -s --no-print-directory firmware
 
 .PHONY: budgets
-budgets: $(BUILD)/sac.elf
+budgets: $(BUILD)/sac.elf ninja-budgets
 	@$(PYTHON) tools/check_size.py $< --size $(AVR)size --flash-budget $(FLASH_BUDGET) --ram-budget $(RAM_BUDGET)
 	@$(PYTHON) tools/check_stack.py $< --su $(BUILD)/firmware --prefix $(AVR)
 
--include $(FIRMWARE_OBJS:.o=.d)
+.PHONY: ninja-budgets
+ninja-budgets: $(BUILD)/ninja.elf
+	@$(PYTHON) tools/check_size.py $< --size $(AVR)size --flash-budget $(NINJA_FLASH_BUDGET) --ram-budget $(NINJA_RAM_BUDGET)
+	@$(PYTHON) tools/check_stack.py $< --su $(BUILD)/firmware/ninja --prefix $(AVR)
+
+-include $(sort $(FIRMWARE_OBJS:.o=.d) $(NINJA_OBJS:.o=.d))
 
 .PHONY: newer
 newer: ## the same sources with the newer avr-gcc (14.2): no warning, and what it makes fits the chip, without a bootloader
@@ -270,7 +313,7 @@ endif
 
 HOST_WARNINGS := -Wall -Wextra -Wconversion -Wshadow -Wstrict-prototypes -Werror
 HOST_CFLAGS := -std=gnu11 -g $(HOST_WARNINGS)
-HOST_HEADERS := $(wildcard firmware/*.h firmware/*/*.h firmware/*/*.def test/*.h test/*/*.h test/*/*/*.h tools/*/*.h)
+HOST_HEADERS := $(wildcard firmware/*.h firmware/*/*.h firmware/*/*/*.h firmware/*/*.def test/*.h test/*/*.h test/*/*/*.h tools/*/*.h)
 SANITIZE := -fsanitize=address,undefined -fno-sanitize-recover=all
 UNITY_FLAGS := -DUNITY_INCLUDE_DOUBLE -DUNITY_SUPPORT_64
 BOARD_OBJS := $(BOARD_SRCS:%.c=$(BUILD)/%.o)
@@ -315,7 +358,7 @@ bench: $(BUILD)/bench $(BUILD)/sac.elf ## measure the image on the board; writes
 TEST_INCLUDES := -isystem $(UNITY) -Itest -Ifirmware -Itest/host -Itest/host/fakes
 
 # Where the tests find what they load.
-TEST_PATHS := -DBOARD_PROGRAMS_DIR='"$(BUILD)/board/programs"' -DSAC_ELF='"$(BUILD)/sac.elf"'
+TEST_PATHS := -DBOARD_PROGRAMS_DIR='"$(BUILD)/board/programs"' -DSAC_ELF='"$(BUILD)/sac.elf"' -DNINJA_ELF='"$(BUILD)/ninja.elf"'
 
 HOST_BINS := $(HOST_TESTS:%=$(BUILD)/host/%)
 AVR_IMAGES := $(AVR_TESTS:%=$(BUILD)/avr/%.elf)
@@ -381,7 +424,7 @@ $(IMAGE_BINS): $(BUILD)/image/%: test/image/%.c $(IMAGE_COMMON_SRCS) $$($$*_SRCS
 
 HOST_PARTS := $(HOST_BINS) $(BUILD)/host/bus_node.so
 BOARD_PARTS := $(BOARD_BINS) $(BOARD_IMAGES)
-IMAGE_PARTS := $(IMAGE_BINS) $(BUILD)/sac.hex
+IMAGE_PARTS := $(IMAGE_BINS) $(BUILD)/sac.hex $(BUILD)/ninja.hex
 SIM_PARTS := $(BUILD)/sacsim $(BUILD)/sac.elf
 AVR_PARTS := $(if $(AVR_TESTS),$(AVR_IMAGES) $(BUILD)/avr/run)
 

@@ -4,7 +4,9 @@
 A folder may include itself and lower ones, never a sibling or a higher one:
 
     base  <  motion, eeprom, net  <  queue  <  cli  <  main.c
+    base  <  motion  <  ninja
 
+ninja/ is an image of its own: nothing else includes it. ninja/hal/ is to it what hal/ is to all.
 hal/ implements headers that its users own (motion/step_port.h and its like), so it may include any folder's headers,
 and nobody but main.c includes hal/. settings.h stands above motion/command.h, boot.h above base; board.h, the pin map,
 drivers.h and version.h include nothing; all five may be read by everyone but base. Only hal/ and the files in HARDWARE may include <avr/...> and <util/...>:
@@ -21,6 +23,7 @@ LEVEL = {"base": 0, "motion": 1, "eeprom": 1, "net": 1, "queue": 2, "cli": 3, "m
 # Files outside hal/ that may include the AVR's headers, and why.
 HARDWARE = {
     "main.c": "boot: reset cause and start-up order",
+    "ninja/main.c": "boot: reset cause and watchdog",
     "base/flash.h": "the one place that knows how constants in flash are read; plain memory on the host",
 }
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^">]+)[">]')
@@ -30,7 +33,7 @@ def room(path):
     """Returns the folder a file below firmware/ belongs to; files at the top are main, settings or board."""
     parts = pathlib.PurePosixPath(path).parts
     if len(parts) > 1:
-        return parts[0]
+        return "hal" if parts[:2] == ("ninja", "hal") else parts[0]
     return {"settings.h": "settings", "settings.c": "settings", "settings.def": "settings", "board.h": "board", "version.h": "version",
             "boot.h": "boot", "drivers.h": "drivers"}.get(parts[0], "main")
 
@@ -48,6 +51,8 @@ def breach(user, used, used_path):
     """Returns what is wrong with a file of room `user` including a file of room `used`, or None."""
     if user == used or user in ("hal", "main"):
         return None
+    if user == "ninja":
+        return None if used in ("base", "motion") else f"ninja may not include {used_path}"
     if used in ("board", "version", "boot", "drivers", "settings"):
         return f"base knows no {used}" if user == "base" else None
     if user == "settings":

@@ -1,5 +1,5 @@
-/* Both serial ports, USART0 and the software port: rings between the main loop and the interrupts of usart_isr.S and
- * soft_uart_isr.S. One is the terminal's, the other one the network's.
+/* Both serial ports, USART0 and the software port: rings between the main loop and the interrupts of usart_receive.S,
+ * usart_transmit.S and soft_uart_isr.S. One is the terminal's, the other one the network's.
  * Source: ATmega328P datasheet DS40002061, sections 15 (Timer0) and 20 (USART). */
 #include "hal/ports.h"
 #include <avr/interrupt.h>
@@ -102,20 +102,9 @@ void ports_listen(void)
 
 /* -- rings --------------------------------------------------------------------------------------------------------- */
 
-ALWAYS_INLINE int16_t take(port_t *port, uint8_t places)
-{
-    const uint8_t tail = port->rx_tail;
-    if (tail == port->rx_head) {
-        return -1;
-    }
-    const uint8_t byte = port->rx[tail];
-    port->rx_tail = tail == places - 1 ? 0 : (uint8_t)(tail + 1);
-    return byte;
-}
-
 static int16_t get(uint8_t software)
 {
-    return software ? take(&soft_uart.port, SOFT_RX_BYTES) : take(&usart_port, USART_RX_BYTES);
+    return software ? port_take(&soft_uart.port, SOFT_RX_BYTES) : port_take(&usart_port, USART_RX_BYTES);
 }
 
 ALWAYS_INLINE uint8_t free_places_of(const port_t *port)

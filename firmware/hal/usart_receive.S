@@ -1,4 +1,4 @@
-; The interrupts of USART0: receive, transmit, and the end of the network's packet.
+; The receive interrupt of USART0, and the end of a run that the transmit interrupt (usart_transmit.S) shares with it.
 ;
 ; A step interrupt may be due every 32 cycles, and Estop and sync at any moment, so these mask only themselves (RXCIE0,
 ; UDRIE0 and TXCIE0 alike), allow interrupts at once and do their work interruptible. Both flags would otherwise call the interrupt
@@ -16,9 +16,7 @@
 
 #include <avr/io.h>
 #include "hal/ports.h"
-
-#define ADDRESS(name) _SFR_MEM_ADDR(name)
-#define IO_SREG _SFR_IO_ADDR(SREG)
+#include "hal/usart_isr.h"
 
 ; Z: the receive ring's next free slot, r25: the head after it; to `full` if there is none. r24 is left alone.
 .macro FREE_SLOT
@@ -43,18 +41,6 @@ usart_port: .skip PORT_RX + USART_RX_BYTES
 
 .section .text
 
-.macro ENTER                    ; cycles since the flag was raised
-    push r24                    ; 9
-    ldi  r24, USART_CONTROL     ; 10
-    sts  ADDRESS(UCSR0B), r24   ; 12
-    sei                         ; 13
-    in   r24, IO_SREG
-    push r25
-    push r30
-    push r31
-    push r24
-.endm
-
 ; -- receive ----------------------------------------------------------------------------------------------------------
 
 .global USART_RX_vect
@@ -70,7 +56,8 @@ good:
     sts  usart_port + PORT_RX_HEAD, r25
     ldi  r24, 1
     sts  wake_flag, r24
-done:
+.global usart_done
+usart_done:
     lds  r25, usart_port + PORT_TX_TAIL
     lds  r24, usart_port + PORT_TX_HEAD
     cp   r24, r25
@@ -108,7 +95,7 @@ full:
     ldi  r24, PORT_DAMAGED
     st   Z, r24
     COUNT PORT_OVERRUNS
-    rjmp done
+    rjmp usart_done
 
 ; Bytes were lost before this one (overrun): PORT_DAMAGED goes before it. Or this one is not what was sent (framing
 ; error): PORT_DAMAGED goes in its place, because the byte itself might read as the end of a line and set the rest of
@@ -127,34 +114,3 @@ lost:
     st   Z, r25
     rjmp good
 
-; -- transmit ---------------------------------------------------------------------------------------------------------
-
-; The data register is empty. With the last byte the interrupt stays masked until the main loop puts another one.
-.global USART_UDRE_vect
-USART_UDRE_vect:
-    ENTER
-    lds  r25, usart_port + PORT_TX_TAIL
-    lds  r24, usart_port + PORT_TX_HEAD
-    cp   r24, r25
-    brne . + 2                  ; over the next instruction
-    rjmp done
-    mov  r30, r25
-    ldi  r31, 0
-    subi r30, lo8(-(usart_port + PORT_TX))
-    sbci r31, hi8(-(usart_port + PORT_TX))
-    ld   r30, Z
-    sts  ADDRESS(UDR0), r30
-    inc  r25
-    andi r25, PORT_TX_BYTES - 1
-    sts  usart_port + PORT_TX_TAIL, r25
-    ldi  r30, 1
-    sts  wake_flag, r30
-    rjmp done
-
-; -- the end of the network's packet ----------------------------------------------------------------------------------
-
-; Enabled once bus_port_end() has said that no byte follows: Tx En falls.
-.global USART_TX_vect
-USART_TX_vect:
-    cbi  _SFR_IO_ADDR(PORTD), PORT_TX_EN
-    reti

@@ -1,0 +1,45 @@
+/* The Ninja, a pan and tilt head: boot, then the polled loop. */
+#include <avr/io.h>
+#include <avr/wdt.h>
+#include "base/atomic.h"
+#include "base/timebase_port.h"
+#include "base/wake.h"
+#include "ninja/centre.h"
+#include "ninja/commands.h"
+#include "ninja/drive.h"
+#include "ninja/pause.h"
+#include "ninja/receive_port.h"
+#include "ninja/sensor_port.h"
+#include "ninja/stepper_port.h"
+
+int main(void)
+{
+    /* First: after its reset the watchdog runs on with its shortest period, 16 ms (datasheet 11.8.2, 11.9). A program that hangs
+     * leaves no coil on: the reset switches all pins off. */
+    MCUSR = 0;
+    wdt_enable(WDTO_120MS);
+    sensor_port_init();
+    stepper_port_init();
+    drive_init();
+    receive_port_init();
+    timebase_start();
+    commands_init();
+    atomic_enable();
+
+    for (;;) {
+        /* Cleared before the polls: what an interrupt leaves to do meanwhile is seen in this round or the next. */
+        wake_flag = 0;
+        wdt_reset();
+        int16_t byte;
+        while ((byte = receive_port_get()) >= 0) {
+            commands_receive((uint8_t)byte);
+        }
+        bool worked = drive_poll();
+        worked |= centre_poll();
+        worked |= pause_poll();
+        worked |= commands_poll();
+        if (!worked) {
+            wake_sleep();
+        }
+    }
+}
