@@ -194,6 +194,7 @@ CHECKS := \
 # The board, its models, the simulator program and the benchmark list their own sources.
 -include test/board/board.mk
 -include test/board/models.mk
+-include test/board/head.mk
 -include tools/sacsim/sacsim.mk
 -include test/bench/bench.mk
 

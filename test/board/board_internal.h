@@ -126,7 +126,7 @@ void pin_drive(board_t *b, board_pin_t pin, int level, uint64_t cycle); /* from 
 /* Is an edge of this pin seen by anybody (recorder, wire, interrupt)? If not, a model may produce its edges late, when
  * its registers or the port are read. */
 bool pin_watched(const board_t *b, board_pin_t pin);
-/* fn is called at every edge of that pin (T0, T1, ICP1, RXD); one listener a pin. */
+/* fn is called at every edge of that pin; a timer and one thing outside (bus.c, head.c) may listen to the same. */
 typedef void (*pin_listener_t)(board_t *b, int level, uint64_t cycle);
 void pin_listen(board_t *b, board_pin_t pin, pin_listener_t fn);
 
@@ -236,6 +236,7 @@ struct board {
     struct reset *reset;
 
     struct bus_node *bus_node; /* bus.c: the board's place on a line; NULL: on none */
+    struct head *head;         /* head.c: NULL: none */
 };
 
 /* simavr adds the instruction's own cycles when the hook has returned. */

@@ -7,6 +7,7 @@
 #define PORTS 3
 #define PINS (PORTS * 8)
 #define WIRES_MAX 16
+#define LISTENERS_MAX 2 /* a pin */
 #define CLOCKS_MAX 4
 
 #define REG_PIN(port) (uint16_t)(0x23 + 3 * (port))
@@ -42,7 +43,7 @@ typedef struct {
 
 struct pins {
     port_t port[PORTS];
-    pin_listener_t listener[PINS];
+    pin_listener_t listener[PINS][LISTENERS_MAX];
     struct {
         board_pin_t output, input;
     } wire[WIRES_MAX];
@@ -108,7 +109,8 @@ static void edge_seen(board_t *b, board_pin_t pin, int level, uint64_t cycle)
             if (pins->wire[i].output == pin)
                 pin_drive(b, pins->wire[i].input, level, cycle);
     if (p->listened & bit)
-        pins->listener[pin](b, level, cycle);
+        for (int i = 0; i < LISTENERS_MAX && pins->listener[pin][i] != NULL; i++)
+            pins->listener[pin][i](b, level, cycle);
 }
 
 static void update(board_t *b, int port, uint64_t cycle)
@@ -215,7 +217,12 @@ bool pin_watched(const board_t *b, board_pin_t pin)
 
 void pin_listen(board_t *b, board_pin_t pin, pin_listener_t fn)
 {
-    b->pins->listener[pin] = fn;
+    int i = 0;
+    while (i < LISTENERS_MAX && b->pins->listener[pin][i] != NULL && b->pins->listener[pin][i] != fn)
+        i++;
+    if (i == LISTENERS_MAX)
+        abort(); /* more listeners than LISTENERS_MAX */
+    b->pins->listener[pin][i] = fn;
     b->pins->port[pin >> 3].listened |= pin_bit(pin);
 }
 
