@@ -21,6 +21,8 @@ JOBS ?= $(shell nproc)
 PORT ?= /dev/ttyUSB0
 BAUD ?= 115200 57600
 PROGRAMMER ?= usbasp
+# Which image is flashed: sac or ninja.
+IMAGE ?= sac
 
 Q := $(if $(V),,@)
 say = $(if $(V)$(findstring s,$(firstword -$(MAKEFLAGS))),,@echo '  $(1)')
@@ -117,7 +119,7 @@ NINJA_SRCS := \
 HOST_TESTS := test_number test_status test_baud test_line test_settings test_store test_session test_queue \
     test_encoder test_ops test_motion_syntax test_commands test_configure test_display test_trial test_terminal test_packet test_network \
     test_bus_nodes test_fuzz test_boot test_drivers test_wide test_block test_group test_ramp test_ramp_next test_profile test_engine \
-    test_property_planner test_processor_model
+    test_property_planner test_processor_model test_ninja_commands test_ninja_path test_ninja_centre test_ninja_constants
 FAKE_SRCS := test/host/fakes/engine_fake.c test/host/fakes/terminal_port_fake.c test/host/fakes/timebase_port_fake.c
 STORE_SRCS := firmware/eeprom/store.c firmware/base/crc16.c firmware/settings.c test/host/fakes/eeprom_port_fake.c
 NET_SRCS := firmware/net/packet.c firmware/net/bus.c test/host/fakes/bus_port_fake.c
@@ -162,6 +164,16 @@ ENGINE_SRCS := firmware/drivers.c firmware/motion/engine.c firmware/motion/block
 test_engine_SRCS := $(ENGINE_SRCS)
 test_processor_model_SRCS := test/image/processor_model.c
 test_property_planner_SRCS := $(ENGINE_SRCS) test/host/motion_exact.c
+NINJA_PATH_SRCS := firmware/ninja/path.c firmware/ninja/drive.c firmware/motion/profile.c $(RAMP_SRCS)
+NINJA_HEAD_SRCS := $(NINJA_PATH_SRCS) firmware/ninja/commands.c firmware/ninja/centre.c firmware/ninja/pause.c firmware/base/number.c
+NINJA_HEAD_HOST_SRCS := test/host/fakes/head_fake.c test/host/fakes/head_firmware.c test/host/fakes/timebase_port_fake.c
+test_ninja_path_SRCS := $(NINJA_PATH_SRCS)
+test_ninja_path_HOST_SRCS := test/host/fakes/head_fake.c
+test_ninja_centre_SRCS := $(NINJA_PATH_SRCS) firmware/ninja/centre.c
+test_ninja_centre_HOST_SRCS := test/host/fakes/head_fake.c
+test_ninja_commands_SRCS := $(NINJA_HEAD_SRCS)
+test_ninja_commands_HOST_SRCS := $(NINJA_HEAD_HOST_SRCS)
+test_ninja_constants_SRCS := $(filter-out %/drive.c,$(NINJA_PATH_SRCS))
 
 # Arithmetic that is tested on the AVR as well: the same source, compiled by avr-gcc, run on the simulated board.
 AVR_TESTS := test_number test_line test_session test_wide test_block test_group test_ramp test_ramp_next test_profile
@@ -385,6 +397,9 @@ $(HOST_BINS): $(BUILD)/host/%: test/host/%.c $$($$*_SRCS) $$($$*_HOST_SRCS) $(BU
 	$(call say,CC  $@)
 	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O1 $(UNITY_FLAGS) $(SANITIZE) $(TEST_INCLUDES) -o $@ $(filter %.c %.o,$^) -lm
 
+$(BUILD)/host/test_ninja_constants: HOST_CFLAGS += -DNINJA_BACKLASH_X=0 -DNINJA_BACKLASH_Y=0 -DNINJA_ACCELERATION=400 \
+    -DNINJA_START_STEPS_PER_S=20 -DNINJA_TOP_STEPS_PER_S=300
+
 # The nodes of test_bus_nodes.
 BUS_NODE_FLAGS := -fPIC -shared -fvisibility=hidden
 $(BUILD)/host/test_bus_nodes: HOST_CFLAGS += -DBUS_NODE_SO='"$(BUILD)/host/bus_node.so"'
@@ -477,6 +492,11 @@ fuzz-long: ## 10^8 damaged lines into the terminal on this machine; SAC_FUZZ_SEE
 	@$(MAKE) -s --no-print-directory $(BUILD)/fuzz
 	@SAC_FUZZ_LINES=$${SAC_FUZZ_LINES:-100000000} $(BUILD)/fuzz
 
+.PHONY: fuzz-ninja-long
+fuzz-ninja-long: ## 10^7 bytes into the Ninja's commands and macros, sanitized (minutes); NINJA_BYTES=n makes fewer, NINJA_SEED=n others
+	@$(MAKE) -s --no-print-directory $(BUILD)/host/test_ninja_commands
+	@NINJA_BYTES=$${NINJA_BYTES:-10000000} $(BUILD)/host/test_ninja_commands
+
 $(BUILD)/packets: test/host/test_packet.c $(test_packet_SRCS) $(BUILD)/unity.o $(HOST_HEADERS) Makefile
 	$(call say,CC  $@)
 	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O2 -flto $(UNITY_FLAGS) $(TEST_INCLUDES) -o $@ $(filter %.c %.o,$^) -lm
@@ -556,7 +576,7 @@ crosscheck: ## the image in avr8js: the edges of clk compared with the board's (
 
 # A Nano's bootloader listens at 115200 bits/s, older ones at 57600: whichever answers.
 .PHONY: flash
-flash: $(BUILD)/sac.hex ## flash a Nano: PORT=/dev/ttyUSB0, if need be BAUD=57600 or 115200
+flash: $(BUILD)/$(IMAGE).hex ## flash a Nano: PORT=/dev/ttyUSB0, if need be BAUD=57600 or 115200; IMAGE=ninja: the Ninja
 	@for baud in $(BAUD); do \
 	    echo "avrdude at $$baud bits/s"; \
 	    avrdude -p atmega328p -c arduino -P $(PORT) -b $$baud -D -U flash:w:$<:i && exit 0; \
@@ -572,7 +592,7 @@ flash: $(BUILD)/sac.hex ## flash a Nano: PORT=/dev/ttyUSB0, if need be BAUD=5760
 FUSES := -U lfuse:w:0xF7:m -U hfuse:w:0xD1:m -U efuse:w:0xFC:m
 
 .PHONY: flash-isp
-flash-isp: $(BUILD)/sac.hex ## flash and set the fuses with an ISP programmer: PROGRAMMER=usbasp
+flash-isp: $(BUILD)/$(IMAGE).hex ## flash and set the fuses with an ISP programmer: PROGRAMMER=usbasp
 	avrdude -p atmega328p -c $(PROGRAMMER) $(FUSES)
 	avrdude -p atmega328p -c $(PROGRAMMER) -U flash:w:$<:i
 

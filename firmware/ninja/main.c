@@ -30,11 +30,12 @@ int main(void)
         /* Cleared before the polls: what an interrupt leaves to do meanwhile is seen in this round or the next. */
         wake_flag = 0;
         wdt_reset();
+        bool worked = drive_poll();
+        /* After it: a halt character that has ended a move is attended to before anything else is begun. */
         int16_t byte;
         while ((byte = receive_port_get()) >= 0) {
             commands_receive((uint8_t)byte);
         }
-        bool worked = drive_poll();
         worked |= centre_poll();
         worked |= pause_poll();
         worked |= commands_poll();

@@ -5,6 +5,9 @@
 /* So that 1 RPM is 1 step/s. */
 #define STEPS_PER_REV 60
 
+/* Intervals that a ramp may lack. */
+#define RAMP_LACKS 2
+
 /* Hundredths of rad/s^2 at 60 steps per revolution, and the ramp value next to it (motion/command.h). */
 #define RAD_CENTI ((uint32_t)(NINJA_ACCELERATION) * 10472 / 1000)
 #define ACCELERATION \
@@ -118,6 +121,18 @@ uint8_t path_by(uint8_t axis, int16_t distance, uint32_t step_us)
 
 /* -- one wait after the other -------------------------------------------------------------------------------------- */
 
+/* SAC's ramps have whole steps, to velocities of whole RPM: they may end two steps short of the cruise's. Here they take those
+ * from the cruise, so that no step of velocity is larger than the law's. */
+static uint16_t take_from_cruise(void)
+{
+    uint16_t more = (uint16_t)((profile.cruise_pulses + 1) / 2);
+    if (more > RAMP_LACKS) {
+        more = RAMP_LACKS;
+    }
+    profile.cruise_pulses -= more;
+    return more;
+}
+
 static void plan(void)
 {
     const motion_command_t command = {
@@ -128,6 +143,10 @@ static void plan(void)
         .flags = MOTION_LINEAR | MOTION_CYCLE,
     };
     profile_plan(&profile, &basis, &command, basis.v_slow);
+    if (profile.accel_pulses != 0) {
+        profile.accel_pulses += take_from_cruise();
+        profile.decel_pulses += take_from_cruise();
+    }
 }
 
 /* On to the next phase that has intervals. The move is planned during the start interval, so that motion begins at once. */
@@ -155,13 +174,15 @@ static uint32_t interval_ticks(void)
     if (phase == START) {
         return basis.slow_ticks;
     }
-    ramp_time_t interval;
+    const uint32_t shortest = cycle_us * (STEPPER_HZ / 1000000);
     if (phase == CRUISE) {
-        interval.ticks = (profile.cruise.chunks << PROFILE_CHUNK_LOG2) + (profile.cruise.ticks_q8 >> 8);
-        interval.frac_q16 = (uint16_t)((uint8_t)profile.cruise.ticks_q8 << 8);
-    } else {
-        block_t unused; /* of a single pulse */
-        ramp_next(&ramp, 1, &interval, &unused);
+        return shortest;
+    }
+    ramp_time_t interval;
+    block_t unused; /* of a single pulse */
+    ramp_next(&ramp, 1, &interval, &unused);
+    if (interval.ticks < shortest) {
+        return shortest;
     }
     fraction_q16 = (uint16_t)(fraction_q16 + interval.frac_q16);
     return interval.ticks + (fraction_q16 < interval.frac_q16);

@@ -20,7 +20,7 @@
 #include "ninja/constants.h"
 #include "ninja/stepper_port.h"
 
-#define PATH_CYCLE_US(steps_per_s) ((1000000UL + (steps_per_s) / 2) / (steps_per_s))
+#define PATH_CYCLE_US(steps_per_s) ((uint32_t)((1000000 + (steps_per_s) / 2) / (steps_per_s)))
 
 typedef struct {
     int16_t min, max; /* position */

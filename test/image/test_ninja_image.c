@@ -15,6 +15,7 @@
 #define BAUD 4800
 #define BYTE_CYCLES (10 * 16000000ull / BAUD)
 #define MOST_EVENTS 20000
+#define HALTS 300
 #define JITTER (5 * US) /* of the step interrupt, behind others */
 
 static board_t *nano;
@@ -250,6 +251,54 @@ static void test_a_move_has_its_steps_and_times(void)
     assert_near("both off", cycle_of(AXIS_X, OFF, 0), cycle_of(AXIS_Y, OFF, 0), US);
 }
 
+static uint16_t address_of(const char *symbol)
+{
+    uint16_t address;
+    TEST_ASSERT_TRUE_MESSAGE(board_symbol(nano, symbol, &address), symbol);
+    return address;
+}
+
+/* NIN-014: the ring is made to look empty for a while: what comes too late begins late, and no step is lost */
+static void test_a_late_planner_loses_no_step(void)
+{
+    home();
+    say("X6V63M");
+    run(10 * MS); /* all waits are in the ring by now */
+    const uint16_t head = address_of("head");
+    const uint8_t filled = board_peek8(nano, head);
+    board_poke8(nano, head, board_peek8(nano, address_of("tail")));
+    run(30 * MS);
+    TEST_ASSERT_EQUAL(1, count_of(AXIS_X, UP));
+    board_poke8(nano, head, filled);
+    const uint64_t then = board_cycle(nano);
+    rest(SECOND);
+    TEST_ASSERT_EQUAL(6, count_of(AXIS_X, UP));
+    assert_near("first interval", (uint64_t)(16e6 * sqrt(2.0 / NINJA_ACCELERATION)), cycle_of(AXIS_X, UP, 1) - then, MS / 4);
+    TEST_ASSERT_EQUAL(1, count_of(AXIS_X, OFF));
+}
+
+static bool all_off(board_t *b, void *ctx)
+{
+    (void)ctx;
+    int on = 0;
+    for (uint8_t coil = 0; coil < 4; coil++)
+        on += board_pin_level(b, BOARD_PIN('D', 4 + coil)) + board_pin_level(b, BOARD_PIN('C', coil));
+    return on == 0;
+}
+
+/* NIN-030: a program that hangs in the middle of a move leaves no coil on */
+static void test_the_watchdog_switches_the_coils_off(void)
+{
+    home();
+    say("X500V63M");
+    run(200 * MS);
+    TEST_ASSERT_FALSE(at_rest());
+    board_on_edge(nano, NULL, NULL);
+    board_hang(nano);
+    TEST_ASSERT_EQUAL(BOARD_MATCHED, board_run_until(nano, all_off, NULL, 150 * MS));
+    run(MS); /* it boots */
+}
+
 /* NIN-012: 125 ms a step are exact, and there is no drift */
 static void test_the_slowest_moves_are_even(void)
 {
@@ -277,9 +326,9 @@ static void test_a_pause_begins_when_motion_is_over(void)
 static void test_a_halt_takes_effect_within_an_interval(void)
 {
     home();
-    for (int i = 0; i < 40; i++) {
+    for (int i = 0; i < HALTS; i++) {
         char line[40];
-        const int v = i % 3 == 0 ? 0 : i * 63 / 39;
+        const int v = i % 5 == 0 ? 0 : i * 63 / (HALTS - 1);
         snprintf(line, sizeof line, "Y0V%dX%dM", v, i % 2 ? -300 : 300);
         say(line);
         run((50 + (uint64_t)i * 37 % 500) * MS + (uint64_t)i * 137 * US);
@@ -343,6 +392,8 @@ int main(void)
     RUN_TEST(test_at_power_up_it_centres);
     RUN_TEST(test_a_sensor_that_never_changes_is_given_up);
     RUN_TEST(test_a_move_has_its_steps_and_times);
+    RUN_TEST(test_a_late_planner_loses_no_step);
+    RUN_TEST(test_the_watchdog_switches_the_coils_off);
     RUN_TEST(test_the_slowest_moves_are_even);
     RUN_TEST(test_a_pause_begins_when_motion_is_over);
     RUN_TEST(test_a_halt_takes_effect_within_an_interval);
