@@ -196,7 +196,7 @@ IMAGE_COMMON_SRCS := test/image/image.c test/image/model.c
 test_image_fuzz_SRCS := test/fuzz/grammar.c test/fuzz/reference.c firmware/settings.c
 
 # Tests written in Python.
-SCRIPT_TESTS := test/tools/test_tools.py test/sim/test_sacsim.py
+SCRIPT_TESTS := test/tools/test_tools.py test/sim/test_sacsim.py test/sim/test_ninjasim.py
 
 # Checks that count as one test each.
 CHECKS := \
@@ -210,6 +210,7 @@ CHECKS := \
 -include test/board/models.mk
 -include test/board/head.mk
 -include tools/sacsim/sacsim.mk
+-include tools/ninjasim/ninjasim.mk
 -include test/bench/bench.mk
 
 # -- firmware --------------------------------------------------------------------------------------------------------
@@ -245,8 +246,8 @@ NINJA_OBJS := $(NINJA_SRCS:firmware/%=$(BUILD)/firmware/%.o)
 .PHONY: firmware
 firmware: $(BUILD)/sac.hex $(BUILD)/ninja.hex budgets ## both images, build/sac.hex and build/ninja.hex; budgets of flash, RAM, stack
 
-.PHONY: ninja
-ninja: $(BUILD)/ninja.hex ninja-budgets ## build/ninja.elf and build/ninja.hex alone, and which objects they share with SAC
+.PHONY: ninja-firmware
+ninja-firmware: $(BUILD)/ninja.hex ninja-budgets ## build/ninja.elf and build/ninja.hex alone, and which objects they share with SAC
 	@echo 'shared: $(notdir $(basename $(filter $(FIRMWARE_OBJS),$(NINJA_OBJS))))'
 
 # Rewritten only when it changes; every object depends on it. Several makes may look at it at the same time.
@@ -345,8 +346,9 @@ $(BOARD_LIB): $(BOARD_OBJS)
 	$(Q)ar rcs $@ $^
 
 SACSIM_OBJS := $(SACSIM_SRCS:%.c=$(BUILD)/%.o)
+NINJASIM_OBJS := $(NINJASIM_SRCS:%.c=$(BUILD)/%.o)
 
-$(SACSIM_OBJS): $(BUILD)/%.o: %.c $(HOST_HEADERS) Makefile
+$(sort $(SACSIM_OBJS) $(NINJASIM_OBJS)): $(BUILD)/%.o: %.c $(HOST_HEADERS) Makefile
 	@mkdir -p $(@D)
 	$(call say,CC  $@)
 	$(Q)$(HOST_CC) $(HOST_CFLAGS) -O2 $(SACSIM_CPPFLAGS) -c -o $@ $<
@@ -358,6 +360,14 @@ $(BUILD)/sacsim: $(SACSIM_OBJS) $(BOARD_LIB)
 .PHONY: sim
 sim: $(BUILD)/sacsim $(BUILD)/sac.elf ## type at a simulated Nano; SIM='--help' lists its options
 	@$(BUILD)/sacsim $(SIM) $(BUILD)/sac.elf
+
+$(BUILD)/ninjasim: $(NINJASIM_OBJS) $(BOARD_LIB)
+	$(call say,LD  $@)
+	$(Q)$(HOST_CC) $(BOARD_LDFLAGS) -o $@ $^ $(BOARD_LIBS) $(NINJASIM_LDLIBS)
+
+.PHONY: ninja
+ninja: $(BUILD)/ninjasim $(BUILD)/ninja.elf ## steer a simulated pan and tilt head; SIM='--help' lists its options
+	@$(BUILD)/ninjasim $(SIM) $(BUILD)/ninja.elf
 
 $(BUILD)/bench: $(BENCH_SRCS) $(BOARD_LIB) $(HOST_HEADERS)
 	$(call say,LD  $@)
@@ -443,7 +453,7 @@ $(IMAGE_BINS): $(BUILD)/image/%: test/image/%.c $(IMAGE_COMMON_SRCS) $$($$*_SRCS
 HOST_PARTS := $(HOST_BINS) $(BUILD)/host/bus_node.so
 BOARD_PARTS := $(BOARD_BINS) $(BOARD_IMAGES)
 IMAGE_PARTS := $(IMAGE_BINS) $(BUILD)/sac.hex $(BUILD)/ninja.hex
-SIM_PARTS := $(BUILD)/sacsim $(BUILD)/sac.elf
+SIM_PARTS := $(BUILD)/sacsim $(BUILD)/sac.elf $(BUILD)/ninjasim $(BUILD)/ninja.elf
 AVR_PARTS := $(if $(AVR_TESTS),$(AVR_IMAGES) $(BUILD)/avr/run)
 
 .PHONY: test-parts
@@ -456,7 +466,7 @@ test_runs = $(foreach run,$(1),--tests $(run))
 AVR_RUNS = $(foreach run,$(AVR_TESTS),--tests '$(BUILD)/avr/run $(BUILD)/avr/$(run).elf')
 # For scripts that may run in another folder.
 AVR_PATH := $(if $(findstring /,$(AVR)),$(abspath $(AVR)),$(AVR))
-TEST_ENV := env BUILD=$(BUILD) SACSIM=$(BUILD)/sacsim SAC_ELF=$(BUILD)/sac.elf AVR=$(AVR_PATH)
+TEST_ENV := env BUILD=$(BUILD) SACSIM=$(BUILD)/sacsim NINJASIM=$(BUILD)/ninjasim SAC_ELF=$(BUILD)/sac.elf NINJA_ELF=$(BUILD)/ninja.elf AVR=$(AVR_PATH)
 SCRIPT_RUNS = $(foreach run,$(SCRIPT_TESTS),--tests '$(TEST_ENV) $(PYTHON) $(run)')
 
 .PHONY: test

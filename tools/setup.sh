@@ -2,7 +2,7 @@
 # Puts in place what SAC needs to be built and tested; when all of it is there, nothing happens.
 #
 # usage: tools/setup.sh [need ...]      `./sac` and `make setup` call it
-#   build    make, gcc, the AVR tools, simavr, Python, Unity (what is looked after when no need is given)
+#   build    make, gcc, the AVR tools, simavr, ncurses, Python, Unity (what is looked after when no need is given)
 #   newer    the newer avr-gcc that must compile the sources without a warning too
 #   flash    avrdude
 #   format   clang-format
@@ -192,6 +192,7 @@ need_build() {
     want_file /usr/lib/avr/include/avr/io.h avr-libc
     want_file /usr/include/simavr/sim_avr.h libsimavr-dev
     want_file /usr/include/libelf.h libelf-dev
+    want_file /usr/include/ncurses.h libncurses-dev
     want_command python3 python3
     install_missing
     need_reference

@@ -2,6 +2,7 @@
 #include "head.h"
 #include "board_internal.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 #define CYCLE_STEPS 4 /* an electrical cycle */
@@ -9,6 +10,7 @@
 #define BACKLASH_MAX 200
 #define COILS 4
 #define HISTORY 128 /* steps: more than two windows have at the highest rate */
+#define RATE_INTERVALS 8
 
 static const struct {
     board_pin_t coil_a, sensor; /* coils B, C, D on the pins that follow */
@@ -32,13 +34,12 @@ typedef struct {
     int low_stop, high_stop; /* of the platform */
     int pulled_to;           /* where the coils pull the rotor, or last did: only a stop keeps it from there */
     bool in_phase;           /* the rotor stands where the next pattern is expected; unknown before the first one */
-    int direction;           /* of the last step */
-    uint64_t interval;       /* before it */
     struct {
         uint64_t cycle;
         int direction;
-    } history[HISTORY]; /* since the coils went on or steps were lost, the last one at [made - 1] */
-    unsigned made;
+    } history[HISTORY];    /* step n at [n % HISTORY] */
+    uint64_t current_from; /* the first step since the current came on */
+    uint64_t judged_from;  /* the first since the rotor stood, or lost steps */
 } motor_t;
 
 struct head {
@@ -89,9 +90,9 @@ static int steps_within(const motor_t *m, uint64_t after, uint64_t until)
 {
     int steps = 0;
 
-    for (unsigned i = m->made; i > 0 && m->made - i < HISTORY && m->history[(i - 1) % HISTORY].cycle > after; i--)
-        if (m->history[(i - 1) % HISTORY].cycle <= until)
-            steps += m->history[(i - 1) % HISTORY].direction;
+    for (uint64_t n = m->state.steps; n-- > m->judged_from && m->state.steps - n <= HISTORY;)
+        if (m->history[n % HISTORY].cycle > after && m->history[n % HISTORY].cycle <= until)
+            steps += m->history[n % HISTORY].direction;
     return steps;
 }
 
@@ -99,7 +100,7 @@ static void lose(motor_t *m, int direction)
 {
     m->pulled_to -= direction * CYCLE_STEPS;
     m->state.lost_steps += CYCLE_STEPS;
-    m->made = 0;
+    m->judged_from = m->state.steps;
 }
 
 /* Has the rate changed too much in the window that ends here? Too fast a start leaves the rotor behind, too sudden a stop
@@ -120,9 +121,9 @@ static void judge_stop(head_t *h, head_axis_t axis, uint64_t cycle)
     motor_t *m = &h->motor[axis];
     uint64_t stood_at = m->state.last_step + HEAD_WINDOW_CYCLES;
 
-    if (m->made > 0 && cycle >= stood_at) {
+    if (m->state.steps > m->judged_from && cycle >= stood_at) {
         judge_rate(m, stood_at);
-        m->made = 0;
+        m->judged_from = m->state.steps;
         turn(h, axis, cycle);
     }
 }
@@ -130,16 +131,13 @@ static void judge_stop(head_t *h, head_axis_t axis, uint64_t cycle)
 static void step(head_t *h, head_axis_t axis, int direction, uint64_t cycle)
 {
     motor_t *m = &h->motor[axis];
-    bool too_soon = m->made > 0 && cycle - m->state.last_step < HEAD_STEP_CYCLES_MIN;
+    bool too_soon = m->state.steps > m->judged_from && cycle - m->state.last_step < HEAD_STEP_CYCLES_MIN;
 
-    m->interval = cycle - m->state.last_step;
-    m->direction = direction;
+    m->history[m->state.steps % HISTORY].cycle = cycle;
+    m->history[m->state.steps % HISTORY].direction = direction;
     m->state.last_step = cycle;
     m->state.steps++;
     m->pulled_to += direction;
-    m->history[m->made % HISTORY].cycle = cycle;
-    m->history[m->made % HISTORY].direction = direction;
-    m->made++;
     if (too_soon)
         lose(m, direction);
     else
@@ -160,13 +158,13 @@ static void current_ends(head_t *h, head_axis_t axis, uint64_t cycle)
 {
     motor_t *m = &h->motor[axis];
 
-    if (m->made > 0 && cycle - m->state.last_step < HEAD_STEP_CYCLES_MIN) {
-        m->pulled_to -= m->direction;
+    if (m->state.steps > m->current_from && cycle - m->state.last_step < HEAD_STEP_CYCLES_MIN) {
+        m->pulled_to -= m->history[(m->state.steps - 1) % HISTORY].direction;
         turn(h, axis, cycle);
     }
     m->in_phase = m->pulled_to == rotor_of(m);
     m->pulled_to = rotor_of(m);
-    m->made = 0;
+    m->current_from = m->judged_from = m->state.steps;
 }
 
 static void pattern(head_t *h, head_axis_t axis, uint8_t coils, uint64_t cycle)
@@ -254,7 +252,7 @@ void head_place(head_t *h, head_axis_t axis, int platform, int slack)
     m->state.slack = clamped(slack, 0, m->state.backlash);
     m->pulled_to = rotor_of(m);
     m->in_phase = false;
-    m->made = 0;
+    m->current_from = m->judged_from = m->state.steps;
     sense(h, axis, board_time(h->b));
 }
 
@@ -279,12 +277,16 @@ const head_state_t *head_state(head_t *h, head_axis_t axis)
 double head_rate(const head_t *h, head_axis_t axis)
 {
     const motor_t *m = &h->motor[axis];
-    uint64_t since = board_time(h->b) - m->state.last_step;
-    uint64_t interval = m->interval > since ? m->interval : since;
+    uint64_t intervals = m->state.steps - m->current_from; /* the one that goes on counted */
+    uint64_t last = m->state.steps - 1;
+    double interval = (double)(board_time(h->b) - m->state.last_step);
 
-    if (m->state.coils == 0 || m->made == 0)
+    if (intervals-- == 0)
         return 0;
-    if (m->made == 1) /* the time before the first step says nothing */
-        interval = since;
-    return interval > 0 ? m->direction * (double)BOARD_CPU_HZ / (double)interval : 0;
+    if (intervals > RATE_INTERVALS)
+        intervals = RATE_INTERVALS;
+    if (intervals > 0)
+        interval = fmax(interval, (double)(m->state.last_step - m->history[(last - intervals) % HISTORY].cycle) /
+                                      (double)intervals);
+    return interval > 0 ? m->history[last % HISTORY].direction * (double)BOARD_CPU_HZ / interval : 0;
 }

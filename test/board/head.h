@@ -65,7 +65,8 @@ void head_free(head_t *h); /* before its board */
 
 /* As it is at the board's present cycle; valid until the board runs on. */
 const head_state_t *head_state(head_t *h, head_axis_t axis);
-/* Steps per second and their sign: of the last step, slower as the next one is due and does not come; 0 with coils off. */
+/* Steps per second, with sign: the mean of the last 8 intervals at most, slower when the next step is due and does not come;
+ * 0 with the coils off. */
 double head_rate(const head_t *h, head_axis_t axis);
 
 /* Turned by hand: coils are to be off. */

@@ -375,11 +375,17 @@ static void test_steps_are_told_with_their_cycle_and_the_recorder_stays_free(voi
     TEST_ASSERT_EQUAL_UINT64(edge[0].cycle, told[0].cycle);
 }
 
-static void test_rate_is_that_of_the_last_step_and_falls_when_none_comes(void)
+static void test_rate_is_a_mean_and_falls_when_no_step_comes(void)
 {
     current_on(HEAD_X);
     TEST_ASSERT_EQUAL_DOUBLE(0, head_rate(head, HEAD_X));
-    steps_at(HEAD_X, -4, CYCLES_AT(100));
+    steps_at(HEAD_X, 3, CYCLES_AT(8));
+    state(HEAD_X); /* the rotor stands between two such steps */
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 8, head_rate(head, HEAD_X));
+    for (int i = 0; i < 8; i++)
+        step_motor(HEAD_X, -1, CYCLES_AT(i & 1 ? 75 : 150));
+    step_motor(HEAD_X, -1, SLOW);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, -100, head_rate(head, HEAD_X));
     TEST_ASSERT_DOUBLE_WITHIN(0.1, -100, head_rate(head, HEAD_X));
     run(BOARD_CPU_HZ / 50);
     TEST_ASSERT_DOUBLE_WITHIN(0.1, -50, head_rate(head, HEAD_X));
@@ -418,7 +424,7 @@ int main(void)
     RUN_TEST(test_sensor_high_is_left_to_the_pull_up);
     RUN_TEST(test_broken_sensor_stays_as_it_is);
     RUN_TEST(test_steps_are_told_with_their_cycle_and_the_recorder_stays_free);
-    RUN_TEST(test_rate_is_that_of_the_last_step_and_falls_when_none_comes);
+    RUN_TEST(test_rate_is_a_mean_and_falls_when_no_step_comes);
     RUN_TEST(test_reset_takes_the_current_and_leaves_the_head);
     return UNITY_END();
 }

@@ -8,14 +8,10 @@ prefix of the cross compiler [avr-]. What the simulator does with an image is te
 Firmware runs the firmware itself. Python's standard library is all that is needed; sigrok-cli is used where installed.
 """
 
-import fcntl
 import os
-import pty
 import re
-import select
 import shutil
 import signal
-import struct
 import subprocess
 import sys
 import tempfile
@@ -27,12 +23,13 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 TOP = os.path.dirname(os.path.dirname(HERE))
 sys.path.insert(0, os.path.join(TOP, "tools"))
 import edges  # noqa: E402  (tools/edges.py)
+import terminal  # noqa: E402  (test/sim/terminal.py)
+from terminal import PATIENCE_S, Reader  # noqa: E402
 
 SACSIM = os.path.abspath(os.environ.get("SACSIM", os.path.join(TOP, "build", "sacsim")))
 FIRMWARE = os.path.abspath(os.environ.get("SAC_ELF", os.path.join(TOP, "build", "sac.elf")))
 AVR = os.environ.get("AVR", "avr-")
 MENU = b"\x1d"  # Ctrl-]
-PATIENCE_S = 20  # for what takes milliseconds on an idle machine
 
 folder = None  # of all files that the tests make
 probe = None  # the small image
@@ -77,85 +74,15 @@ def run_slowly(keys, *arguments):
     return output, errors, child.returncode
 
 
-class Reader:
-    """Collects what comes from a file descriptor, and waits for a pattern in it."""
+class Terminal(terminal.Terminal):
+    """sacsim as a user runs it."""
 
-    def __init__(self, descriptor):
-        self.descriptor = descriptor
-        self.seen = b""
-        self.position = 0
-
-    def pump(self, seconds):
-        """Reads for so long, or until something has come. False at the end of the file."""
-        if select.select([self.descriptor], [], [], seconds)[0]:
-            try:
-                data = os.read(self.descriptor, 65536)
-            except OSError:
-                return False
-            self.seen += data
-            return bool(data)
-        return True
-
-    def expect(self, pattern):
-        """Waits for the pattern behind what was expected before; returns the match."""
-        limit = time.monotonic() + PATIENCE_S
-        while True:
-            match = re.compile(pattern, re.DOTALL).search(self.seen, self.position)
-            if match:
-                self.position = match.end()
-                return match
-            if time.monotonic() > limit or not self.pump(0.2):
-                raise AssertionError(f"no {pattern!r}; the last that came: {self.seen[self.position:][-400:]!r}")
-
-    def send(self, data):
-        os.write(self.descriptor, data)
-
-
-class Terminal(Reader):
-    """sacsim as a user runs it: a terminal is its input, its output and what its signals come from."""
-
-    def __init__(self, *arguments, image=None, rows=24, columns=100, term="xterm"):
-        master, slave = pty.openpty()
-        super().__init__(master)
-        self.slave = slave
-        self.resize(rows, columns, tell=False)
-        self.before = termios.tcgetattr(slave)
-        self.child = subprocess.Popen(
-            [SACSIM, *arguments, image or probe],
-            stdin=slave,
-            stdout=slave,
-            stderr=slave,
-            env={**os.environ, "TERM": term},
-            start_new_session=True,
-            preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
-        )
-
-    def resize(self, rows, columns, tell=True):
-        fcntl.ioctl(self.slave, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
-        if tell:
-            self.child.send_signal(signal.SIGWINCH)
+    def __init__(self, *arguments, image=None, **screen):
+        super().__init__([SACSIM, *arguments, image or probe], **screen)
 
     def expect_status(self, pattern, row=24):
         """Waits for a status line in that row that has the pattern."""
         return self.expect(rb"\x1b\[%d;1H\x1b\[0;7m[^\x1b]*?(?:%s)[^\x1b]*\x1b\[0m" % (row, pattern))
-
-    def end(self):
-        """Waits for the end; returns the exit code and the terminal's settings as they are then."""
-        limit = time.monotonic() + PATIENCE_S
-        while self.child.poll() is None and time.monotonic() < limit:
-            self.pump(0.05)
-        self.pump(0)
-        return self.child.wait(timeout=1), termios.tcgetattr(self.slave)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        if self.child.poll() is None:
-            self.child.kill()
-            self.child.wait()
-        os.close(self.slave)
-        os.close(self.descriptor)
 
 
 class Script(unittest.TestCase):

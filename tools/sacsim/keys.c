@@ -2,22 +2,9 @@
 
 #include <ctype.h>
 #include <stddef.h>
+#include <stdio.h>
 
-const char *const keys_help[] = {
-    "Ctrl-] and then",
-    "  q  quit",
-    "  r  press the Nano's reset button",
-    "  p  power off and on",
-    "  e  ground Estop; again: release it",
-    "  y  ground sync for 1 ms",
-    "  f  ground RST (factory reset at a power-on); again: release it",
-    "  s  status line off; again: on",
-    "  ?  this list",
-    "  Ctrl-]  sends one Ctrl-] to the Nano",
-    NULL,
-};
-
-keys_action_t keys_feed(keys_t *k, uint8_t key)
+int keys_feed(keys_t *k, uint8_t key)
 {
     if (!k->escaped) {
         k->escaped = key == KEYS_ESCAPE;
@@ -30,15 +17,28 @@ keys_action_t keys_feed(keys_t *k, uint8_t key)
     if (key < 0x20) {
         key |= 0x60; /* a letter with the Ctrl key still down */
     }
-    switch (tolower(key)) {
-    case 'q': return KEYS_QUIT;
-    case 'r': return KEYS_RESET;
-    case 'p': return KEYS_POWER;
-    case 'e': return KEYS_ESTOP;
-    case 'y': return KEYS_SYNC;
-    case 'f': return KEYS_FACTORY;
-    case 's': return KEYS_STATUS;
-    case '?': return KEYS_HELP;
-    default: return KEYS_UNKNOWN;
+    for (const keys_own_t *own = k->own; own->key != 0; own++) {
+        if (tolower(key) == own->key) {
+            return own->action;
+        }
     }
+    return KEYS_UNKNOWN;
+}
+
+const char *keys_help(const keys_t *k, unsigned line)
+{
+    static char text[80];
+    unsigned own = 0;
+
+    if (line == 0) {
+        return "Ctrl-] and then";
+    }
+    while (k->own[own].key != 0 && own < line) {
+        own++;
+    }
+    if (line <= own) {
+        snprintf(text, sizeof text, "  %c  %s", k->own[line - 1].key, k->own[line - 1].help);
+        return text;
+    }
+    return line == own + 1 ? "  Ctrl-]  sends one Ctrl-] to the Nano" : NULL;
 }

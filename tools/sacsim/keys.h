@@ -1,4 +1,4 @@
-/* The keys of sacsim's own: everything after Ctrl-], the rest belongs to the board.
+/* The keys of a simulator's own: everything after Ctrl-], the rest belongs to the board.
  *
  * Context: pure; no terminal, no board.
  * Errors:  an unknown key after Ctrl-] is reported as such and does nothing.
@@ -11,27 +11,28 @@
 
 enum { KEYS_ESCAPE = 0x1d, KEYS_CTRL_C = 0x03 }; /* Ctrl-]: as telnet has it, and no line of SAC's needs it */
 
-typedef enum {
+/* What a key is for; from KEYS_OWN on: what the simulator's own list says. */
+enum {
     KEYS_NOTHING, /* Ctrl-] itself: the next key decides */
     KEYS_BYTE,    /* for the board */
-    KEYS_QUIT,
-    KEYS_RESET,
-    KEYS_POWER,
-    KEYS_ESTOP,
-    KEYS_SYNC,
-    KEYS_FACTORY,
-    KEYS_STATUS,
-    KEYS_HELP,
-    KEYS_UNKNOWN,
-} keys_action_t;
+    KEYS_UNKNOWN, /* after Ctrl-] */
+    KEYS_OWN,
+};
 
 typedef struct {
+    char key; /* in lower case; 0: the end of the list */
+    int action;
+    const char *help;
+} keys_own_t;
+
+typedef struct {
+    const keys_own_t *own;
     bool escaped; /* Ctrl-] was the last key */
 } keys_t;
 
-keys_action_t keys_feed(keys_t *k, uint8_t key);
+int keys_feed(keys_t *k, uint8_t key);
 
-/* The list for Ctrl-] ?: lines, NULL at the end. */
-extern const char *const keys_help[];
+/* The list of keys, line by line; NULL behind the last. A line is valid until the next call. */
+const char *keys_help(const keys_t *k, unsigned line);
 
 #endif

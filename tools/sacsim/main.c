@@ -1,10 +1,9 @@
 /* sacsim: SAC's firmware on a simulated Arduino Nano. docs/simulator.md is its manual. */
-#include <signal.h>
-
 #include "console.h"
 #include "network.h"
 #include "options.h"
 #include "session.h"
+#include "signals.h"
 
 int main(int argc, char **argv)
 {
@@ -14,9 +13,8 @@ int main(int argc, char **argv)
     options_parse(&options, argc, argv);
     code = options.nodes > 0 ? network_run(&options) : session_run(&options);
     console_restore();
-    if (code < 0) { /* end as the signal would have, so that a calling shell knows */
-        signal(-code, SIG_DFL);
-        raise(-code);
+    if (code < 0) {
+        signals_end_by(-code);
     }
     return code;
 }

@@ -11,6 +11,7 @@
 #include "eeprom_file.h"
 #include "pace.h"
 #include "pty.h"
+#include "signals.h"
 #include "test/board/bus.h"
 
 #define CYCLES_PER_MS (BOARD_CPU_HZ / 1000)
@@ -291,7 +292,7 @@ static int run(void)
     uint64_t limit = net.o->for_seconds > 0.0 ? (uint64_t)(net.o->for_seconds * (double)BOARD_CPU_HZ) : UINT64_MAX;
     pace_t pace;
 
-    pace_start(&pace, net.o->fast, 0);
+    pace_start(&pace, net.o->fast ? PACE_FAST : 1.0, 0);
     while (end_signal == 0 && bus_cycle(net.bus) < limit) {
         uint64_t target = pace_target(&pace, bus_cycle(net.bus));
         double speed;
@@ -326,14 +327,9 @@ static int run(void)
 
 int network_run(const options_t *o)
 {
-    static const int ends[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT};
     int code = EXIT_TROUBLE;
 
-    for (size_t i = 0; i < sizeof ends / sizeof ends[0]; i++) {
-        struct sigaction action = {.sa_handler = on_end}; /* without SA_RESTART: sleeps are to end */
-
-        sigaction(ends[i], &action, NULL);
-    }
+    signals_handle_ends(on_end);
     net.o = o;
     net.bus = bus_new();
     if (open_all()) {

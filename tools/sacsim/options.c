@@ -1,11 +1,11 @@
 #include "options.h"
 
 #include <argp.h>
-#include <ctype.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "numbers.h"
 
 enum {
     KEY_LINGER = 256,
@@ -69,27 +69,6 @@ static const struct argp_option options[] = {
     {NULL, 0, NULL, 0, "Help:", -1},
     {0},
 };
-
-static double number(struct argp_state *state, const char *what, const char *text, double low, double high)
-{
-    char *end;
-    double value = strtod(text, &end);
-
-    if (end == text || *end != '\0' || !(value >= low && value <= high)) {
-        argp_error(state, "%s: '%s' is not a number from %.15g to %.15g", what, text, low, high);
-    }
-    return value;
-}
-
-static unsigned whole(struct argp_state *state, const char *what, const char *text, unsigned low, unsigned high)
-{
-    double value = number(state, what, text, low, high);
-
-    if (value != floor(value)) {
-        argp_error(state, "%s: '%s' is not a whole number", what, text);
-    }
-    return (unsigned)value;
-}
 
 static void list_posts(void)
 {
@@ -191,11 +170,11 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 
     switch (key) {
     case 'f': o->fast = true; break;
-    case 't': o->for_seconds = number(state, "--for", arg, 1e-6, 1e9); break;
-    case KEY_LINGER: o->linger_ms = number(state, "--linger", arg, 1, 1e9); break;
+    case 't': o->for_seconds = numbers_real(state, "--for", arg, 1e-6, 1e9); break;
+    case KEY_LINGER: o->linger_ms = numbers_real(state, "--linger", arg, 1, 1e9); break;
     case KEY_WIRE: parse_wire(state, o, arg); break;
     case 'E': o->eeprom = arg; break;
-    case 'b': o->baud = number(state, "--baud", arg, 300, 2e6); break;
+    case 'b': o->baud = numbers_real(state, "--baud", arg, 300, 2e6); break;
     case 'p': o->pty = true; break;
     case 'l': o->link = arg; break;
     case KEY_NO_RESET: o->reset_on_open = false; break;
@@ -203,14 +182,14 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     case KEY_VCD: o->vcd = arg; break;
     case 'P': parse_pins(state, o, arg); break;
     case KEY_NO_STATUS: o->status = false; break;
-    case KEY_STEPS_PER_REV: o->steps_per_rev = whole(state, "--steps-per-rev", arg, 1, 100000); break;
-    case KEY_MICROSTEPS: o->microsteps = whole(state, "--microsteps", arg, 1, 256); break;
-    case KEY_CW: o->cw_level = (uint8_t)whole(state, "--cw", arg, 0, 1); break;
+    case KEY_STEPS_PER_REV: o->steps_per_rev = (unsigned)numbers_whole(state, "--steps-per-rev", arg, 1, 100000); break;
+    case KEY_MICROSTEPS: o->microsteps = (unsigned)numbers_whole(state, "--microsteps", arg, 1, 256); break;
+    case KEY_CW: o->cw_level = (uint8_t)numbers_whole(state, "--cw", arg, 0, 1); break;
     case KEY_NODES:
-        o->nodes = whole(state, "--nodes", arg, 1, OPTIONS_NODES_MAX);
+        o->nodes = (unsigned)numbers_whole(state, "--nodes", arg, 1, OPTIONS_NODES_MAX);
         o->pty = true;
         break;
-    case KEY_BUS_BAUD: o->bus_baud = number(state, "--bus-baud", arg, 300, 1e6); break;
+    case KEY_BUS_BAUD: o->bus_baud = numbers_real(state, "--bus-baud", arg, 300, 1e6); break;
     case ARGP_KEY_ARG:
         if (o->image != NULL) {
             argp_error(state, "one image at a time: '%s' is one too many", arg);

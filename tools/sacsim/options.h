@@ -10,14 +10,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "exit_codes.h"
 #include "posts.h"
-
-/* Exit codes besides 0; a signal ends the program as that signal does. */
-enum {
-    EXIT_TROUBLE = 1, /* a file, a terminal or the image could not be used */
-    EXIT_USAGE = 2,   /* wrong command line */
-    EXIT_CRASHED = 3, /* the image ran into an illegal instruction, out of flash or out of stack */
-};
 
 enum { OPTIONS_POSTS_MAX = 24, OPTIONS_WIRES_MAX = 8, OPTIONS_NODES_MAX = 16 };
 

@@ -6,6 +6,7 @@
 
 #define CYCLES_PER_MS (BOARD_CPU_HZ / 1000)
 #define NS_PER_MS INT64_C(1000000)
+#define NS_PER_CYCLE 62.5
 
 enum {
     SLICE_MS = 4,        /* how long a key may wait for the board */
@@ -24,31 +25,30 @@ int64_t pace_now_ns(void)
     return (int64_t)t.tv_sec * 1000 * NS_PER_MS + t.tv_nsec;
 }
 
-/* 62.5 ns a cycle */
 static int64_t due_ns(const pace_t *p, uint64_t cycle)
 {
-    return p->base_ns + (int64_t)((cycle - p->base_cycle) * 125 / 2);
+    return p->base_ns + (int64_t)((double)(cycle - p->base_cycle) * NS_PER_CYCLE / p->speed);
 }
 
-void pace_start(pace_t *p, bool fast, uint64_t cycle)
+void pace_start(pace_t *p, double speed, uint64_t cycle)
 {
     int64_t now = pace_now_ns();
 
-    *p = (pace_t){.fast = fast, .base_cycle = cycle, .base_ns = now, .window_ns = now, .window_cycle = cycle};
+    *p = (pace_t){.speed = speed, .base_cycle = cycle, .base_ns = now, .window_ns = now, .window_cycle = cycle};
 }
 
 uint64_t pace_target(const pace_t *p, uint64_t cycle)
 {
     int64_t slice_ms = SLICE_MS;
 
-    if (!p->fast) {
+    if (p->speed != PACE_FAST) {
         int64_t behind_ms = (pace_now_ns() - due_ns(p, cycle)) / NS_PER_MS;
 
         if (behind_ms > slice_ms) {
             slice_ms = behind_ms < CATCH_UP_MS ? behind_ms : CATCH_UP_MS;
         }
     }
-    return cycle + (uint64_t)slice_ms * CYCLES_PER_MS;
+    return cycle + (uint64_t)((double)slice_ms * CYCLES_PER_MS * (p->speed != PACE_FAST ? p->speed : 1.0));
 }
 
 /* Behind by so much that it is given up: time goes on from here. */
@@ -66,7 +66,7 @@ double pace_wait(pace_t *p, uint64_t cycle)
     int64_t now, due;
     double speed = 0.0;
 
-    if (p->fast) {
+    if (p->speed == PACE_FAST) {
         return 0.0;
     }
     now = pace_now_ns();
@@ -80,7 +80,7 @@ double pace_wait(pace_t *p, uint64_t cycle)
     }
     if (now - p->window_ns > WINDOW_MS * NS_PER_MS) {
         if (p->lost_ns > WARN_LOST_MS * NS_PER_MS && !p->warned) {
-            speed = (double)(cycle - p->window_cycle) * 62.5 / (double)(now - p->window_ns);
+            speed = (double)(cycle - p->window_cycle) * NS_PER_CYCLE / (double)(now - p->window_ns);
             p->warned = true;
         }
         p->window_ns = now;

@@ -1,4 +1,4 @@
-/* Keeps simulated time in step with the host's clock.
+/* Keeps simulated time in step with the host's clock, or so many times as fast.
  *
  * Units:   CPU cycles of 62.5 ns; nanoseconds of CLOCK_MONOTONIC.
  * Errors:  a host that is too slow makes simulated time fall behind: what cannot be caught up is given up, and
@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 typedef struct {
-    bool fast;
+    double speed; /* simulated over the host's time; PACE_FAST: as fast as the host can */
     bool warned;
     uint64_t base_cycle;
     int64_t base_ns;
@@ -22,7 +22,8 @@ typedef struct {
 
 int64_t pace_now_ns(void);
 
-void pace_start(pace_t *p, bool fast, uint64_t cycle);
+#define PACE_FAST 0.0
+void pace_start(pace_t *p, double speed, uint64_t cycle);
 
 /* The cycle to run to next: one slice ahead, a larger one while behind. */
 uint64_t pace_target(const pace_t *p, uint64_t cycle);

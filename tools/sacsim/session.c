@@ -15,6 +15,7 @@
 #include "meter.h"
 #include "pace.h"
 #include "pty.h"
+#include "signals.h"
 #include "trace.h"
 
 #define CYCLES_PER_MS (BOARD_CPU_HZ / 1000)
@@ -91,26 +92,11 @@ static void on_stop(int number)
     stop_asked = 1;
 }
 
-static void handle(int number, void (*handler)(int))
-{
-    struct sigaction action = {.sa_handler = handler}; /* without SA_RESTART: sleeps and writes are to end */
-    struct sigaction before;
-
-    sigaction(number, NULL, &before);
-    if (before.sa_handler != SIG_IGN) { /* as nohup wants it */
-        sigaction(number, &action, NULL);
-    }
-}
-
 static void catch_signals(void)
 {
-    static const int ends[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT};
-
-    for (size_t i = 0; i < sizeof ends / sizeof ends[0]; i++) {
-        handle(ends[i], on_end);
-    }
-    handle(SIGWINCH, on_window);
-    handle(SIGTSTP, on_stop);
+    signals_handle_ends(on_end);
+    signals_handle(SIGWINCH, on_window);
+    signals_handle(SIGTSTP, on_stop);
     signal(SIGPIPE, SIG_IGN);
 }
 
@@ -230,11 +216,13 @@ static void show_status(session_t *s, int64_t now)
     console_status(line.text);
 }
 
-static void show_help(void)
+static void show_help(const session_t *s)
 {
+    const char *line;
+
     console_print("");
-    for (size_t i = 0; keys_help[i] != NULL; i++) {
-        console_print(keys_help[i]);
+    for (unsigned i = 0; (line = keys_help(&s->keys, i)) != NULL; i++) {
+        console_print(line);
     }
 }
 
@@ -412,6 +400,29 @@ static void end(session_t *s, int code)
     }
 }
 
+enum {
+    KEYS_QUIT = KEYS_OWN,
+    KEYS_RESET,
+    KEYS_POWER,
+    KEYS_ESTOP,
+    KEYS_SYNC,
+    KEYS_FACTORY,
+    KEYS_STATUS,
+    KEYS_HELP,
+};
+
+static const keys_own_t own_keys[] = {
+    {'q', KEYS_QUIT, "quit"},
+    {'r', KEYS_RESET, "press the Nano's reset button"},
+    {'p', KEYS_POWER, "power off and on"},
+    {'e', KEYS_ESTOP, "ground Estop; again: release it"},
+    {'y', KEYS_SYNC, "ground sync for 1 ms"},
+    {'f', KEYS_FACTORY, "ground RST (factory reset at a power-on); again: release it"},
+    {'s', KEYS_STATUS, "status line off; again: on"},
+    {'?', KEYS_HELP, "this list"},
+    {0},
+};
+
 static void hold(session_t *s, board_pin_t pin, bool *held, const char *what)
 {
     *held = !*held;
@@ -419,7 +430,7 @@ static void hold(session_t *s, board_pin_t pin, bool *held, const char *what)
     notice(s, "%s %s", what, *held ? "grounded" : "released");
 }
 
-static void own_key(session_t *s, keys_action_t action, uint8_t key)
+static void own_key(session_t *s, int action, uint8_t key)
 {
     switch (action) {
     case KEYS_NOTHING: break;
@@ -452,7 +463,7 @@ static void own_key(session_t *s, keys_action_t action, uint8_t key)
         notice(s, "sync grounded for %d ms", SYNC_MS);
         break;
     case KEYS_STATUS: console_set_status(!console_has_status()); break;
-    case KEYS_HELP: show_help(); break;
+    case KEYS_HELP: show_help(s); break;
     case KEYS_UNKNOWN: notice(s, "Ctrl-] ? lists the keys"); break;
     }
 }
@@ -577,7 +588,7 @@ static void look_at_signals(session_t *s)
         console_restore();
         raise(SIGSTOP);
         console_reopen();
-        pace_start(&s->pace, s->o->fast, board_cycle(s->board));
+        pace_start(&s->pace, s->o->fast ? PACE_FAST : 1.0, board_cycle(s->board));
     }
 }
 
@@ -608,7 +619,7 @@ static void run(session_t *s)
 {
     uint64_t limit = s->o->for_seconds > 0.0 ? (uint64_t)(s->o->for_seconds * (double)BOARD_CPU_HZ) : UINT64_MAX;
 
-    pace_start(&s->pace, s->o->fast, board_cycle(s->board));
+    pace_start(&s->pace, s->o->fast ? PACE_FAST : 1.0, board_cycle(s->board));
     while (!s->done) {
         uint64_t target = pace_target(&s->pace, board_cycle(s->board));
         double speed;
@@ -669,7 +680,7 @@ int session_run(const options_t *o)
     static session_t s; /* large, and one is enough */
     static pty_t pty;
 
-    s = (session_t){.o = o};
+    s = (session_t){.o = o, .keys = {.own = own_keys}};
     catch_signals();
     if (o->pty) {
         if (!pty_open(&pty, o->link)) {
