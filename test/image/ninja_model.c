@@ -96,6 +96,23 @@ static bool leg_done(const ninja_model_t *m)
     return legs[leg].until != RUN_UP && sensor_low(m, m->centre.axis) == (legs[leg].until == UNTIL_LOW);
 }
 
+/* Behind step k of a ramp from a standstill. */
+static double law(unsigned k)
+{
+    static const double rad = 2 * 3.14159265358979 / 60;
+    const double acceleration = round(NINJA_ACCELERATION * rad) / rad; /* whole rad/s^2 at 60 steps per revolution (constants.h) */
+    return (double)SECOND * sqrt(2 / acceleration) * (sqrt(k + 1.0) - sqrt(k));
+}
+
+/* Behind step k of the major axis. */
+static double interval(const ninja_model_t *m, unsigned k)
+{
+    const double start = NINJA_START_INTERVAL;
+    return m->move.cruise >= start
+               ? m->move.cruise
+               : fmax(m->move.cruise, fmax(law(k), fmin(start, law(m->move.most - 1 - k))));
+}
+
 static void all_due(ninja_model_t *m, ninja_what_t what)
 {
     for (uint8_t axis = 0; axis < AXES; axis++) {
@@ -110,14 +127,7 @@ static void begin_move(ninja_model_t *m, uint32_t step_us)
     m->move.most = m->move.steps[AXIS_X] > m->move.steps[AXIS_Y] ? m->move.steps[AXIS_X] : m->move.steps[AXIS_Y];
     if (m->move.most == 0)
         return;
-    const uint32_t acceleration = (uint32_t)lround(NINJA_ACCELERATION * 2 * 3.14159265358979 / 60) * 100; /* whole rad/s^2 */
-    m->move.plan = model_plan((machine_t){60, 0, NINJA_START_STEPS_PER_S},
-                              (request_t){.count = m->move.most,
-                                          .velocity = step_us,
-                                          .cycle = true,
-                                          .linear = true,
-                                          .accel = acceleration,
-                                          .decel = acceleration});
+    m->move.cruise = (double)step_us * US;
     m->move.runs = true;
     m->move.begins = true;
     m->move.halted = false;
@@ -154,7 +164,7 @@ static void begin_leg(ninja_model_t *m)
 /* The step, or the end, that comes next. */
 static void next_due(ninja_model_t *m)
 {
-    m->move.due_at += m->move.made == 0 ? (double)NINJA_START_INTERVAL : model_interval(&m->move.plan, m->move.made - 1);
+    m->move.due_at += m->move.made == 0 ? (double)NINJA_START_INTERVAL : interval(m, m->move.made - 1);
     if (m->move.halted || m->move.made == m->move.most || (m->centre.runs && leg_done(m))) {
         all_due(m, NINJA_OFF);
         return;

@@ -12,12 +12,14 @@
  * How it reads what the decisions leave open: a waiting M, S, I or C stays in the FIFO; P has left it, but not the byte behind its
  * number, and nothing behind it is interpreted until the pause is over. A sign counts right behind the letter, once. ) in a
  * macro that runs ends it.
- * Units:   cycles of 62.5 ns; steps; tenths of a second. Times of a path: model.h, with 60 steps per revolution.
+ * Time:    the major axis has constant acceleration from a standstill, with sqrt(2/a) (sqrt(k+1) - sqrt(k)) behind step k (from 0);
+ *          it ends likewise, but with no interval longer than that of the start speed; none is shorter than that of V. What is
+ *          no faster than the start speed has no ramps.
+ * Units:   cycles of 62.5 ns; steps; tenths of a second.
  * Source:  seed lines N1-128; decisions 0.5, A-NIN-02 to -16. */
 #ifndef TEST_IMAGE_NINJA_MODEL_H
 #define TEST_IMAGE_NINJA_MODEL_H
 
-#include "model.h"
 #include "ninja.h"
 
 #define NINJA_FIFO 16
@@ -74,7 +76,7 @@ typedef struct {
         unsigned steps[AXES]; /* to make */
         int direction[AXES];
         unsigned most, made;
-        plan_t plan;
+        double cruise; /* interval of the major axis at V */
         uint64_t on;   /* or, while it begins, when it may begin at the earliest */
         double due_at; /* since then */
         ninja_what_t what[AXES];
