@@ -12,6 +12,7 @@
 #define TOKENS 30
 #define PATIENCE (4 * SECOND)
 
+static uint64_t number; /* of the program: its seed */
 static uint64_t seed;
 static bool verbose;
 
@@ -27,6 +28,8 @@ void setUp(void)
 
 void tearDown(void)
 {
+    if (Unity.CurrentTestFailed)
+        printf("program %llu\n", (unsigned long long)number);
     ninja_off();
 }
 
@@ -155,7 +158,7 @@ static head_options_t somewhere(void)
 }
 
 /* Whether it was a clear case. */
-static bool run_program(uint64_t number)
+static bool run_program(void)
 {
     seed = number;
     const head_options_t head = somewhere();
@@ -199,14 +202,14 @@ static void test_random_programs_do_what_the_model_says(void)
     const char *only = getenv("SAC_NINJA_SEED");
     if (only != NULL) {
         verbose = true;
-        run_program(strtoull(only, NULL, 0));
+        number = strtoull(only, NULL, 0);
+        run_program();
         return;
     }
     const unsigned wanted = programs ? (unsigned)strtoul(programs, NULL, 0) : PROGRAMS;
-    uint64_t number = 0;
-    for (unsigned done = 0; done < wanted; number++) {
-        done += run_program(number);
-    }
+    number = 0;
+    for (unsigned done = 0; done < wanted; number++)
+        done += run_program();
     printf("%u programs (%u more in which two things were too close together), %.0f s: %u moves, %zu steps and switches, %u halts, "
            "%u bytes lost, %u pauses\n",
            wanted, sums.unclear, sums.seconds, sums.moves, sums.steps, sums.halts, sums.drops, sums.pauses);
