@@ -82,7 +82,7 @@ bool centre_poll(void)
         return false;
     }
     if (drive_runs()) { /* this leg, or a move that was halted */
-        if (!moves || found || !seen()) {
+        if (found || !seen()) {
             return false;
         }
         found = true;

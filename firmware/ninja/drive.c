@@ -38,7 +38,6 @@ void drive_by(uint8_t axis, int16_t steps, uint32_t step_us)
 
 void drive_halt(void)
 {
-    planned = false;
     stepper_port_halt();
 }
 

@@ -62,10 +62,16 @@ static void test_it_ends_at_the_edge_from_everywhere(void)
             TEST_ASSERT_TRUE_MESSAGE(axes == 0 || axes >= last, "X after Y");
             last = axes ? axes : last;
         }
-        /* The last step upwards, at the approach's velocity. */
+        /* What is so already is not looked for. */
+        TEST_ASSERT_EQUAL((x >= 0 ? 3 : 4) + (y >= 0 ? 3 : 4), head_moves);
+        /* The last steps upwards: backlash and run-up, and the step that has left the edge; at the approach's velocity. */
         const head_event_t *end = &head_events[head_event_count - 1];
         TEST_ASSERT_EQUAL(end[-2].counts[AXIS_Y] + 1, end[-1].counts[AXIS_Y]);
         TEST_ASSERT_EQUAL(STEPPER_HZ / NINJA_APPROACH_STEPS_PER_S, end[-1].ticks - end[-2].ticks);
+        int up_steps = 0;
+        for (const head_event_t *e = end - 1; e->step && e[-1].counts[AXIS_Y] < e->counts[AXIS_Y]; e--)
+            up_steps++;
+        TEST_ASSERT_EQUAL(NINJA_BACKLASH_Y + NINJA_RUN_UP + 1, up_steps);
         /* Its slack is taken up: upwards as many steps as there are units, downwards the backlash more. */
         const int16_t up[AXES] = {10, 10}, down[AXES] = {5, 5};
         drive_to(up, 2000);

@@ -164,6 +164,18 @@ static void test_pauses(void)
     }
 }
 
+/* NIN-019: its tenths add up, whenever it is polled */
+static void test_a_pause_does_not_drift(void)
+{
+    timebase_fake_us = UINT32_MAX - 5000000;
+    const uint32_t begun = timebase_fake_us;
+    timebase_fake_step_us = 70;
+    pause_begin(100);
+    while (pause_poll()) {
+    }
+    TEST_ASSERT_UINT32_WITHIN(140, 10000000, timebase_fake_us - begun);
+}
+
 /* -- the FIFO ------------------------------------------------------------------------------------------------------ */
 
 /* NIN-005: 16 bytes, in sequence; the 17th is lost */
@@ -343,8 +355,10 @@ static void test_a_halted_macro_begins_anew(void)
     while (head_events[end].axes != 0)
         end++;
     TEST_ASSERT_EQUAL(10 - NINJA_BACKLASH_X, head_events[end].counts[AXIS_X]); /* the first move was to 10 */
-    head_say("(X5M)RX6M"); /* waits until it has ended */
-    assert_at(6, 0);
+    leads_to("X0Y0M", 0, 0);
+    head_fake_forget();
+    leads_to("(X5MX7M)RY9M", 7, 9); /* Y9 waits until it has ended */
+    TEST_ASSERT_EQUAL(3, head_moves);
 }
 
 /* NIN-025: a definition that is halted is discarded */
@@ -454,6 +468,7 @@ int main(void)
     RUN_TEST(test_increments);
     RUN_TEST(test_what_waits_for_motion);
     RUN_TEST(test_pauses);
+    RUN_TEST(test_a_pause_does_not_drift);
     RUN_TEST(test_the_fifo_holds_sixteen_bytes);
     RUN_TEST(test_a_halt_purges_everything_but_the_macro);
     RUN_TEST(test_a_move_is_resumed);

@@ -32,6 +32,7 @@ static event_t events[MOST_EVENTS];
 static size_t event_count;
 static struct {
     uint8_t coils;
+    uint64_t changed; /* when */
     int pattern; /* the last one seen, n modulo 4 */
     long steps;  /* of the motor, since power-up */
     long edge;   /* the sensor is low from here on */
@@ -58,13 +59,16 @@ static void note(uint64_t cycle, uint8_t axis, int what)
         events[event_count++] = (event_t){cycle, axis, what};
 }
 
-/* A step changes two pins in the same cycle: what lies between is no pattern. */
+/* A step changes two pins in the same cycle: what lies between is no pattern, and does not last. */
 static void on_edge(void *ctx, board_edge_t edge)
 {
     (void)ctx;
     const uint8_t axis = edge.pin >= BOARD_PIN('D', 0) ? AXIS_X : AXIS_Y;
     const uint8_t bit = (uint8_t)(1 << (axis == AXIS_X ? edge.pin - BOARD_PIN('D', 4) : edge.pin - BOARD_PIN('C', 0)));
     const uint8_t before = axes[axis].coils;
+    if (edge.cycle != axes[axis].changed && before != 0 && pattern_of(before) < 0)
+        TEST_FAIL_MESSAGE("other than two coils were on"); /* NIN-030 */
+    axes[axis].changed = edge.cycle;
     axes[axis].coils = (uint8_t)(edge.level ? before | bit : before & ~bit);
     if (axes[axis].coils == 0) {
         note(edge.cycle, axis, OFF);
@@ -117,6 +121,11 @@ static void assert_near(const char *what, uint64_t expected, uint64_t seen, uint
 
 /* -- the head ------------------------------------------------------------------------------------------------------ */
 
+static void run(uint64_t cycles)
+{
+    TEST_ASSERT_EQUAL_MESSAGE(BOARD_RAN, board_run_for(nano, cycles), board_crash(nano));
+}
+
 static void power_on(long x_edge, long y_edge, int x_stuck, int y_stuck)
 {
     nano = board_new(NINJA_ELF, NULL);
@@ -126,6 +135,7 @@ static void power_on(long x_edge, long y_edge, int x_stuck, int y_stuck)
     const int stuck[AXES] = {x_stuck, y_stuck};
     for (uint8_t axis = 0; axis < AXES; axis++) {
         axes[axis].coils = 0;
+        axes[axis].changed = 0;
         axes[axis].pattern = 0;
         axes[axis].steps = 0;
         axes[axis].edge = edge[axis];
@@ -136,11 +146,6 @@ static void power_on(long x_edge, long y_edge, int x_stuck, int y_stuck)
     }
     clear_events();
     board_on_edge(nano, on_edge, NULL);
-}
-
-static void run(uint64_t cycles)
-{
-    TEST_ASSERT_EQUAL_MESSAGE(BOARD_RAN, board_run_for(nano, cycles), board_crash(nano));
 }
 
 static void say(const char *text)
@@ -181,11 +186,16 @@ void tearDown(void)
 {
     size_t count;
     board_uart_received(nano, &count);
-    const int transmitter = board_pin_level(nano, BOARD_PIN('D', 1)); /* not driven: its pull-up */
+    int pull_ups = 0;
+    for (uint8_t axis = 0; axis < AXES; axis++) {
+        board_pin_drive(nano, BOARD_PIN('B', axis), -1);
+        pull_ups += board_pin_level(nano, BOARD_PIN('B', axis));
+    }
+    pull_ups += board_pin_level(nano, BOARD_PIN('D', 1)); /* the transmitter's is not driven either */
     board_free(nano);
     nano = NULL;
     TEST_ASSERT_EQUAL_MESSAGE(0, count, "something was transmitted"); /* NIN-002 */
-    TEST_ASSERT_EQUAL(1, transmitter);
+    TEST_ASSERT_EQUAL(3, pull_ups);
 }
 
 /* -- centring ------------------------------------------------------------------------------------------------------ */
@@ -226,6 +236,36 @@ static void test_a_sensor_that_never_changes_is_given_up(void)
         TEST_ASSERT_EQUAL(100, axes[AXIS_Y].steps);
         if (level == 0)
             tearDown();
+    }
+}
+
+/* -- the line ------------------------------------------------------------------------------------------------------ */
+
+/* Of USART0 (datasheet, register summary). */
+enum { UCSR0A = 0xC0, UCSR0B = 0xC1, UCSR0C = 0xC2, UBRR0 = 0xC4, U2X = 1 << 1, TXEN = 1 << 3, RXEN = 1 << 4 };
+
+static bool transmits(board_t *b, void *ctx)
+{
+    (void)ctx;
+    return (board_peek8(b, UCSR0B) & TXEN) != 0;
+}
+
+/* NIN-001, NIN-002: 4,800 Bd within 0.1 %, 8N1; the transmitter is off at any moment */
+static void test_the_line_is_only_listened_to(void)
+{
+    home();
+    const unsigned samples = board_peek8(nano, UCSR0A) & U2X ? 8 : 16;
+    TEST_ASSERT_DOUBLE_WITHIN(4.8, 4800, 16e6 / samples / (board_peek16(nano, UBRR0) + 1));
+    TEST_ASSERT_EQUAL_HEX8(0x06, board_peek8(nano, UCSR0C));
+    TEST_ASSERT_EQUAL_HEX8(RXEN, board_peek8(nano, UCSR0B) & (RXEN | TXEN));
+    board_uart_send_text(nano, "X10Y10M?\r\b");
+    TEST_ASSERT_EQUAL(BOARD_RAN, board_run_until(nano, transmits, NULL, 100 * MS));
+    for (double baud = 4704; baud < 4900; baud += 192) { /* 2 % off */
+        board_uart_baud(nano, baud);
+        clear_events();
+        say("V63X20Y20MX0Y0M");
+        rest(5 * SECOND);
+        TEST_ASSERT_EQUAL(2, count_of(AXIS_X, ON));
     }
 }
 
@@ -299,6 +339,25 @@ static void test_the_watchdog_switches_the_coils_off(void)
     run(MS); /* it boots */
 }
 
+/* NIN-012, NIN-013: each V's step in the middle of a move, within what the interrupt's latency makes of 0.5 us */
+static void test_all_velocities(void)
+{
+    home();
+    for (int v = 0; v < 64; v++) {
+        char line[40];
+        const int steps = v < 30 ? 8 : 300;
+        clear_events();
+        snprintf(line, sizeof line, "X%dV%dIX0S", steps, v);
+        say(line);
+        while (count_of(AXIS_X, OFF) == 0)
+            run(MS);
+        const size_t middle = (size_t)steps / 2;
+        assert_near(line, (uint64_t)(16e6 / (8 * pow(62.5, v / 63.0))), cycle_of(AXIS_X, UP, middle) - cycle_of(AXIS_X, UP, middle - 1),
+                    JITTER);
+        rest(5 * SECOND);
+    }
+}
+
 /* NIN-012: 125 ms a step are exact, and there is no drift */
 static void test_the_slowest_moves_are_even(void)
 {
@@ -364,6 +423,26 @@ static void test_a_halt_takes_effect_within_an_interval(void)
     TEST_ASSERT_EQUAL(axes[AXIS_Y].edge, axes[AXIS_Y].steps);
 }
 
+/* NIN-006, NIN-025: even if the main loop does not come round: the step interrupt sees it */
+static void test_a_halt_needs_no_main_loop(void)
+{
+    for (int i = 0; i < 2; i++) {
+        home();
+        say("X300V63M");
+        run(400 * MS);
+        board_hang(nano);
+        clear_events();
+        board_uart_send(nano, i ? "\b" : "\022", 1);
+        run(BYTE_CYCLES);
+        const size_t steps = count_of(AXIS_X, UP);
+        run(5 * MS);
+        TEST_ASSERT_EQUAL(steps, count_of(AXIS_X, UP));
+        TEST_ASSERT_TRUE(at_rest());
+        if (i == 0)
+            tearDown();
+    }
+}
+
 /* NIN-024, NIN-025, NIN-027, NIN-028 */
 static void test_a_macro_repeats_until_it_is_halted(void)
 {
@@ -394,9 +473,12 @@ int main(void)
     RUN_TEST(test_a_move_has_its_steps_and_times);
     RUN_TEST(test_a_late_planner_loses_no_step);
     RUN_TEST(test_the_watchdog_switches_the_coils_off);
+    RUN_TEST(test_all_velocities);
     RUN_TEST(test_the_slowest_moves_are_even);
     RUN_TEST(test_a_pause_begins_when_motion_is_over);
     RUN_TEST(test_a_halt_takes_effect_within_an_interval);
+    RUN_TEST(test_a_halt_needs_no_main_loop);
+    RUN_TEST(test_the_line_is_only_listened_to);
     RUN_TEST(test_a_macro_repeats_until_it_is_halted);
     return UNITY_END();
 }
