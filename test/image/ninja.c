@@ -6,7 +6,7 @@
 
 #define COILS 4
 #define TXD BOARD_PIN('D', 1)
-#define REST (200 * MS)
+#define REST (350 * MS)
 
 head_t *ninja_head;
 const char *const ninja_names[] = {"on", "off", "up", "down"};
@@ -161,6 +161,18 @@ void ninja_home(void)
     ninja_rest(10 * SECOND);
     ninja_assert_at(0, 0);
     ninja_forget();
+}
+
+void ninja_reset(void)
+{
+    board_reset(board, BOARD_RESET_EXTERNAL);
+    ninja_forget();
+    for (uint8_t axis = 0; axis < AXES; axis++) {
+        const head_axis_t which = axis == AXIS_X ? HEAD_X : HEAD_Y;
+        const head_state_t *state = head_state(ninja_head, which);
+        head_place(ninja_head, which, state->platform, state->slack);
+        motors[axis].n = 0;
+    }
 }
 
 void ninja_off(void)

@@ -32,6 +32,7 @@ extern const char *const ninja_names[]; /* of ninja_what_t */
 void ninja_power_on(const head_options_t *options);
 /* A head at its centre: on to where it has been centred; what was recorded until then is forgotten. */
 void ninja_home(void);
+void ninja_reset(void); /* the button; the patterns begin at A+B again, and draw the rotors there */
 void ninja_off(void);
 
 /* -- typing -------------------------------------------------------------------------------------------------------- */
@@ -54,7 +55,7 @@ int ninja_made(uint8_t axis); /* steps up less steps down */
 /* -- the head ------------------------------------------------------------------------------------------------------ */
 
 bool ninja_current(void);            /* flows through some coil */
-void ninja_rest(uint64_t most);      /* time passes until none has flowed for 200 ms */
+void ninja_rest(uint64_t most);      /* time passes until none has flowed for 350 ms */
 int ninja_platform(uint8_t axis);    /* where it stands; nothing may have been lost on the way */
 void ninja_assert_at(int x, int y);
 

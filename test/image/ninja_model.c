@@ -11,7 +11,7 @@
 #define BACKSPACE 0x08
 #define CTRL_R 0x12
 #define V_TOP 63
-#define HALT_CYCLES (30 * US)  /* a step so long after a halt was on its way */
+#define HALT_CYCLES (40 * US)  /* a step so long after a halt was on its way */
 #define EXACT 1e-4             /* of the time since a move's begin: tolerance of the ramp's arithmetic */
 #define ENDLESS 1000           /* commands of a macro at one moment */
 #define RATE(steps_per_s) ((uint32_t)lround(1e6 / (steps_per_s)))

@@ -11,7 +11,7 @@
 ninja_model_t play_model;
 
 static struct {
-    uint64_t cycle; /* when the receiver has it: in the middle of its stop bit */
+    uint64_t cycle; /* when the receiver has it: 10/16 of its stop bit are over */
     uint8_t byte;
 } typed[MOST_BYTES];
 static size_t typed_count;
@@ -73,7 +73,7 @@ void play_type(const char *text)
     for (; *text != '\0'; text++) {
         if (typed_count == MOST_BYTES)
             image_fail("too much was typed");
-        typed[typed_count].cycle = ninja_send((uint8_t)*text) - NINJA_BIT / 2;
+        typed[typed_count].cycle = ninja_send((uint8_t)*text) - NINJA_BIT * 3 / 8;
         typed[typed_count++].byte = (uint8_t)*text;
     }
 }
