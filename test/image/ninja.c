@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #define COILS 4
+enum { DDRD = 0x2A, UCSR0B = 0xC1, TXEN0 = 1 << 3 };
 #define TXD BOARD_PIN('D', 1)
 #define REST (350 * MS)
 
@@ -165,6 +166,7 @@ void ninja_home(void)
 
 void ninja_reset(void)
 {
+    const bool before = driven;
     board_reset(board, BOARD_RESET_EXTERNAL);
     ninja_forget();
     for (uint8_t axis = 0; axis < AXES; axis++) {
@@ -173,6 +175,8 @@ void ninja_reset(void)
         head_place(ninja_head, which, state->platform, state->slack);
         motors[axis].n = 0;
     }
+    image_run(MS);
+    driven = before; /* the pull-up was off */
 }
 
 void ninja_off(void)
@@ -181,6 +185,7 @@ void ninja_off(void)
         return;
     size_t bytes;
     board_uart_received(board, &bytes);
+    driven |= (board_peek8(board, DDRD) & 1 << 1) != 0 || (board_peek8(board, UCSR0B) & TXEN0) != 0;
     settle();
     head_free(ninja_head);
     ninja_head = NULL;
