@@ -183,12 +183,14 @@ IMAGE_TESTS := test_image_boot test_image_pins test_image_encoder test_image_mot
     test_image_sequence test_image_terminal test_image_stop test_image_configure test_image_powercut test_image_system test_image_timing test_image_clock test_image_stress \
     test_image_estop test_image_ops test_image_processor test_image_fuzz test_image_automicro test_image_manual test_image_bus \
     test_image_network test_image_line test_image_nodes \
-    test_ninja_image test_ninja_programs test_ninja_motion test_ninja_halt test_ninja_centre
+    test_ninja_image test_ninja_programs test_ninja_motion test_ninja_halt test_ninja_centre \
+    test_ninja_language
 NINJA_TEST_SRCS := test/image/ninja.c test/image/ninja_model.c test/image/ninja_play.c
 test_ninja_programs_SRCS := $(NINJA_TEST_SRCS)
 test_ninja_motion_SRCS := $(NINJA_TEST_SRCS)
 test_ninja_halt_SRCS := $(NINJA_TEST_SRCS)
 test_ninja_centre_SRCS := $(NINJA_TEST_SRCS)
+test_ninja_language_SRCS := $(NINJA_TEST_SRCS)
 test_image_bus_SRCS := test/image/soft_peer.c
 test_image_network_SRCS := test/image/soft_peer.c test/image/master.c
 test_image_line_SRCS := test/image/soft_peer.c test/image/master.c test/fuzz/grammar.c

@@ -13,6 +13,7 @@
 #define V_TOP 63
 #define HALT_CYCLES (40 * US)  /* a step so long after a halt was on its way */
 #define EXACT 1e-4             /* of the time since a move's begin: tolerance of the ramp's arithmetic */
+#define BUSY (4 * MS)          /* with planning a move: what is behind it in FIFO or macro may wait so long */
 #define ENDLESS 1000           /* commands of a macro at one moment */
 #define RATE(steps_per_s) ((uint32_t)lround(1e6 / (steps_per_s)))
 
@@ -135,6 +136,7 @@ static void begin_move(ninja_model_t *m, uint32_t step_us)
     m->move.on = m->now;
     m->move.due_at = 0;
     all_due(m, NINJA_ON);
+    m->begun = m->now;
     m->moves++;
 }
 
@@ -354,7 +356,7 @@ static void settle(ninja_model_t *m)
 
 static void halt(ninja_model_t *m)
 {
-    if (m->now - m->settled < NINJA_LATENCY)
+    if (m->now - m->settled < BUSY || m->now - m->begun < BUSY)
         m->unclear++;
     m->halts++;
     if (m->move.begins) {

@@ -146,6 +146,21 @@ static void test_a_sensor_that_is_stuck_is_given_up(void)
     printf("%.1f s at most\n", longest);
 }
 
+/* NIN-017: the last leg is the slowest: it is given up after as many steps */
+static void test_a_sensor_that_fails_in_the_approach_is_given_up(void)
+{
+    ninja_power_on(&head_defaults);
+    while (ninja_count(AXIS_Y, NINJA_ON) < 3) /* its third leg: the other two were downwards */
+        image_run(100 * MS);
+    head_break_sensor(ninja_head, HEAD_Y, HEAD_SENSOR_STUCK_HIGH);
+    ninja_rest(90 * SECOND);
+    TEST_ASSERT_EQUAL(1956, ninja_count(AXIS_Y, NINJA_UP));
+    TEST_ASSERT_FALSE(ninja_current());
+    ninja_type("X20V63M"); /* it goes on */
+    ninja_rest(SECOND);
+    TEST_ASSERT_EQUAL(20, head_state(ninja_head, HEAD_X)->platform);
+}
+
 /* NIN-017, NIN-025: halted in the middle, it knows where it is; once more, and it ends as always */
 static void test_a_halted_centring_leaves_the_position(void)
 {
@@ -173,6 +188,7 @@ int main(void)
     RUN_TEST(test_centring_is_the_same_whatever_asks_for_it);
     RUN_TEST(test_a_reset_from_outside_centres);
     RUN_TEST(test_a_sensor_that_is_stuck_is_given_up);
+    RUN_TEST(test_a_sensor_that_fails_in_the_approach_is_given_up);
     RUN_TEST(test_a_halted_centring_leaves_the_position);
     return UNITY_END();
 }
