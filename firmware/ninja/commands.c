@@ -19,7 +19,9 @@
                       __builtin_pow((double)NINJA_TOP_STEPS_PER_S / NINJA_CREEP_STEPS_PER_S, (n) / (double)V_MAX)) + \
                0.5)
 #define V_8(n) V(n), V(n + 1), V(n + 2), V(n + 3), V(n + 4), V(n + 5), V(n + 6), V(n + 7)
-static const uint32_t cycles_us[V_MAX + 1] FLASH = {V_8(0), V_8(8), V_8(16), V_8(24), V_8(32), V_8(40), V_8(48), V_8(56)};
+static const uint32_t cycles_us[V_MAX + 1] FLASH = {
+    V_8(0), V_8(8), V_8(16), V_8(24), V_8(32), V_8(40), V_8(48), V_8(56),
+};
 
 /* -- registers, and what is under way ------------------------------------------------------------------------------ */
 

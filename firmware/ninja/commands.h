@@ -1,9 +1,9 @@
 /* The Ninja's commands: bytes to registers, moves and macros.
  *
- * A command is a letter, in either case, some with a number behind it; what is none is ignored. Bytes wait in a FIFO of 16 until
- * they are interpreted; where it is full, new ones are lost. A letter with a number takes effect when the first byte
- * arrives that no longer belongs to it. M, S, I, C and P wait until motion is over, in the FIFO or as the number they are; a pause
- * holds up everything behind it. Backspace and Ctrl-R are never in the FIFO.
+ * A command is a letter, in either case, some with a number behind it; what is none is ignored. Bytes wait in a FIFO
+ * of 16 until they are interpreted; where it is full, new ones are lost. A letter with a number takes effect when the
+ * first byte arrives that no longer belongs to it. M, S, I, C and P wait until motion is over; P
+ * and its pause hold up everything behind them. Backspace and Ctrl-R are never in the FIFO.
  *
  *   X Y  number  where to go: saturates at the limits        (    begins a macro's definition
  *   V    number  velocity 0..63, 63 if outside               )    ends it
@@ -12,8 +12,8 @@
  *   C            centring                                    ^R   the same, then all as after power-up
  *   P    number  pause: tenths of a second, 16 bits unsigned
  *
- * A macro has 64 bytes: one a letter, two a number, missing ones too. A command that does not fit is left out. What arrives while
- * it runs waits in the FIFO.
+ * A macro has 64 bytes: one a letter, two a number, missing ones too. A command that does not fit is left out. What
+ * arrives while it runs waits in the FIFO.
  * Units:   steps; tenths of a second. Numbers saturate to -32768..65535.
  * Context: main loop; pure. Errors: none reported: there is nobody to report to.
  * Source:  seed lines N1-99; decisions A-NIN-03 to -12, -16. Tests: test/host/test_ninja_commands.c */

@@ -1,5 +1,6 @@
-/* The Ninja's build constants: what the mechanism is like. Each may be set otherwise: make firmware DEFS=-DNINJA_BACKLASH_X=9
+/* The Ninja's build constants: what the mechanism is like.
  *
+ * Each may be set otherwise: make firmware DEFS=-DNINJA_BACKLASH_X=9
  * Units:   steps are full steps, and units of position; their rates are per second.
  * Limits:  checked in path.c at compile time.
  * Source:  seed lines N18-39 (X, Y, V), N87-128 (motion); decisions A-NIN-02, -03, -12, -14. */
@@ -21,8 +22,8 @@
 #define NINJA_CREEP_STEPS_PER_S 8
 #endif
 
-/* Acceleration and deceleration in steps/s^2, 10..9500. From 955 on it is rounded to whole rad/s^2 of SAC's ramp values:
- * 1,000 is 104.72, run as 105 (1,002.7). */
+/* Acceleration and deceleration in steps/s^2, 10..9500. From 955 on it is rounded to whole rad/s^2 of SAC's ramp
+ * values: 1,000 is 104.72, run as 105 (1,002.7). */
 #ifndef NINJA_ACCELERATION
 #define NINJA_ACCELERATION 1000
 #endif
@@ -54,9 +55,9 @@
 #define NINJA_BACKLASH_Y 6
 #endif
 
-/* Centring: how fast the sensor's edge is looked for, how fast it is approached in the end, how many steps more than the
- * backlash lie before it then, and how many more than the whole travel and the backlash a search takes before it is given
- * up. */
+/* Centring: how fast the sensor's edge is looked for, how fast it is approached in the end, how many steps more than
+ * the backlash lie before it then, and how many more than the whole travel and the backlash a search takes before it
+ * is given up. */
 #ifndef NINJA_SEARCH_STEPS_PER_S
 #define NINJA_SEARCH_STEPS_PER_S 200
 #endif

@@ -14,8 +14,8 @@
 
 int main(void)
 {
-    /* First: after its reset the watchdog runs on with its shortest period, 16 ms (datasheet 11.8.2, 11.9). A program that hangs
-     * leaves no coil on: the reset switches all pins off. */
+    /* First: after its reset the watchdog runs on with its shortest period, 16 ms (datasheet 11.8.2, 11.9). A program
+     * that hangs leaves no coil on: the reset switches all pins off. */
     MCUSR = 0;
     wdt_enable(WDTO_120MS);
     sensor_port_init();

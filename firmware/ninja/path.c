@@ -14,9 +14,11 @@
     ((accel_code_t)(RAD_CENTI <= 9999 ? RAD_CENTI : ACCEL_CODE_WHOLE - 100 + (RAD_CENTI + 50) / 100))
 
 _Static_assert(NINJA_START_STEPS_PER_S >= 1 && NINJA_START_STEPS_PER_S <= 255, "profile_basis() takes a byte");
-_Static_assert(NINJA_TOP_STEPS_PER_S >= NINJA_CREEP_STEPS_PER_S && NINJA_TOP_STEPS_PER_S <= 1000, "1 ms a step at least");
-_Static_assert(NINJA_CREEP_STEPS_PER_S >= 8, "125 ms a step at most");
+_Static_assert(NINJA_TOP_STEPS_PER_S >= NINJA_CREEP_STEPS_PER_S, "V63 is not slower than V0");
+_Static_assert(NINJA_TOP_STEPS_PER_S <= 1000 && NINJA_CREEP_STEPS_PER_S >= 8, "1..125 ms a step");
 _Static_assert(NINJA_ACCELERATION >= 10 && NINJA_ACCELERATION <= 9500, "the ramp values' range");
+_Static_assert(NINJA_X_MAX - NINJA_X_MIN + NINJA_SEARCH_MARGIN <= 10000 &&
+                   NINJA_Y_MAX - NINJA_Y_MIN + NINJA_SEARCH_MARGIN <= 10000, "16 bits, also beyond the travel");
 _Static_assert(NINJA_BACKLASH_X <= 200 && NINJA_BACKLASH_Y <= 200, "a byte");
 
 const path_limits_t path_limits[AXES] = {
@@ -121,8 +123,8 @@ uint8_t path_by(uint8_t axis, int16_t distance, uint32_t step_us)
 
 /* -- one wait after the other -------------------------------------------------------------------------------------- */
 
-/* SAC's ramps have whole steps, to velocities of whole RPM: they may end two steps short of the cruise's. Here they take those
- * from the cruise, so that no step of velocity is larger than the law's. */
+/* SAC's ramps have whole steps, to velocities of whole RPM: they may end two steps short of the cruise's. Here they
+ * take those from the cruise, so that no step of velocity is larger than the law's. */
 static uint16_t take_from_cruise(void)
 {
     uint16_t more = (uint16_t)((profile.cruise_pulses + 1) / 2);
@@ -149,7 +151,8 @@ static void plan(void)
     }
 }
 
-/* On to the next phase that has intervals. The move is planned during the start interval, so that motion begins at once. */
+/* On to the next phase that has intervals. The move is planned during the start interval, so that motion begins at
+ * once. */
 static void next_phase(void)
 {
     while (left == 0 && phase != OVER) {

@@ -1,6 +1,7 @@
 /* The pause of P: tenths of a second.
  *
- * Context: main loop. Errors: none. Source: seed lines N63-66. Tests: test/host/test_ninja_commands.c; test/image/test_ninja_image.c */
+ * Context: main loop. Errors: none. Source: seed lines N63-66. Tests: test/host/test_ninja_commands.c;
+ *          test/image/test_ninja_image.c */
 #ifndef NINJA_PAUSE_H
 #define NINJA_PAUSE_H
 

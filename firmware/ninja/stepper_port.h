@@ -1,7 +1,7 @@
 /* The two motors: steps at exact times; implemented by hal/stepper.c with Timer1.
  *
- * A move is a row of waits, each followed by a step of one axis or both, or by the end: all coils off. The main loop keeps a
- * short ring of them filled, the timer's interrupt makes the steps.
+ * A move is a row of waits, each followed by a step of one axis or both, or by the end: all coils off. The main loop
+ * keeps a short ring of them filled, the timer's interrupt makes the steps.
  * Units:   ticks of 0.5 us. A wait begins where the one before has ended, so there is no drift. One that comes too late
  *          for that begins late: no step is lost.
  * Context: main loop. Errors: none. Tests: test/host/fakes/stepper_port_fake.c; test/image/test_ninja_image.c.
@@ -45,8 +45,8 @@ void stepper_port_halt(void);
 /* A move is under way, its end included. */
 bool stepper_port_runs(void);
 
-/* Motor count n, modulo 65,536: steps made so far in the positive direction less those in the negative one. While no move
- * is under way. Its pattern is n modulo 4: coils A+B, B+C, C+D, D+A. */
+/* Motor count n, modulo 65,536: steps made so far in the positive direction less those in the negative one. While no
+ * move is under way. Its pattern is n modulo 4: coils A+B, B+C, C+D, D+A. */
 uint16_t stepper_port_count(uint8_t axis);
 
 #endif

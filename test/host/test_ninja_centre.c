@@ -64,7 +64,8 @@ static void test_it_ends_at_the_edge_from_everywhere(void)
         }
         /* What is so already is not looked for. */
         TEST_ASSERT_EQUAL((x >= 0 ? 3 : 4) + (y >= 0 ? 3 : 4), head_moves);
-        /* The last steps upwards: backlash and run-up, and the step that has left the edge; at the approach's velocity. */
+        /* The last steps upwards: backlash and run-up, and the step that has left the edge; at the approach's
+         * velocity. */
         const head_event_t *end = &head_events[head_event_count - 1];
         TEST_ASSERT_EQUAL(end[-2].counts[AXIS_Y] + 1, end[-1].counts[AXIS_Y]);
         TEST_ASSERT_EQUAL(STEPPER_HZ / NINJA_APPROACH_STEPS_PER_S, end[-1].ticks - end[-2].ticks);

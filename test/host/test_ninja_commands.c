@@ -1,5 +1,5 @@
-/* ninja/commands: numbers, the FIFO, macros, what waits and what does not; and under bytes of all kinds. The whole firmware
- * above its ports, on a head that plays its waits. */
+/* ninja/commands: numbers, the FIFO, macros, what waits and what does not; and under bytes of all kinds. The whole
+ * firmware above its ports, on a head that plays its waits. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -150,7 +150,8 @@ static void test_pauses(void)
     const struct {
         const char *text;
         unsigned tenths;
-    } cases[] = {{"P3", 3}, {"P", 0}, {"P0", 0}, {"P65535", 65535}, {"P65536", 65535}, {"P-1", 65535}, {"P-32769", 32768}};
+    } cases[] = {{"P3", 3},           {"P", 0},        {"P0", 0},           {"P65535", 65535},
+                 {"P65536", 65535}, {"P-1", 65535}, {"P-32769", 32768}};
     for (unsigned i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         setUp();
         head_say("X10M");
@@ -160,7 +161,8 @@ static void test_pauses(void)
         unsigned end = 0;
         while (head_events[end].axes != 0)
             end++;
-        TEST_ASSERT_EQUAL_UINT64((uint64_t)cases[i].tenths * STEPPER_HZ / 10, head_events[end + 1].ticks - head_events[end].ticks);
+        TEST_ASSERT_EQUAL_UINT64((uint64_t)cases[i].tenths * STEPPER_HZ / 10,
+                                 head_events[end + 1].ticks - head_events[end].ticks);
     }
 }
 

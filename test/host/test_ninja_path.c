@@ -54,7 +54,8 @@ static double ms_between(unsigned event, unsigned later)
 
 /* -- times --------------------------------------------------------------------------------------------------------- */
 
-/* NIN-014, NIN-030, NIN-031: start interval, a ramp from standstill, cruise, a ramp to the start velocity, closing interval */
+/* NIN-014, NIN-030, NIN-031: start interval, a ramp from standstill, cruise, a ramp to the start velocity, closing
+ * interval */
 static void test_a_move_follows_the_law(void)
 {
     go(700, 0, PATH_CYCLE_US(500));
@@ -96,8 +97,8 @@ static double square(double x)
     return x * x;
 }
 
-/* NIN-031: also of moves too short for the velocity. Of v^2, 2 a a step at most, from each interval to the next ones; the mean
- * velocity of the first one is half of what it ends with, and 0.5 us are up to 0.06 of a step. */
+/* NIN-031: also of moves too short for the velocity. Of v^2, 2 a a step at most, from each interval to the next ones;
+ * the mean velocity of the first one is half of what it ends with, and 0.5 us are up to 0.06 of a step. */
 static void test_no_acceleration_exceeds_the_constant(void)
 {
     for (int i = 0; i < 300; i++) {
@@ -128,7 +129,8 @@ static void test_paths_are_straight(void)
         const unsigned steps = (unsigned)(abs(x) > abs(y) ? abs(x) : abs(y));
         TEST_ASSERT_EQUAL(steps + 2, head_event_count);
         for (unsigned k = 0; k <= steps; k++) {
-            const int done_x = abs(head_events[k].counts[AXIS_X] - x0), done_y = abs(head_events[k].counts[AXIS_Y] - y0);
+            const int done_x = abs(head_events[k].counts[AXIS_X] - x0);
+            const int done_y = abs(head_events[k].counts[AXIS_Y] - y0);
             TEST_ASSERT_EQUAL(k * (unsigned)abs(x) / steps, done_x);
             TEST_ASSERT_EQUAL(k * (unsigned)abs(y) / steps, done_y);
         }
@@ -182,7 +184,8 @@ static int platform(uint8_t axis)
     return linkage[axis].platform + backlash[axis];
 }
 
-/* NIN-026, NIN-032, NIN-033: random moves, one in three halted somewhere: where the platform is, is what the firmware says */
+/* NIN-026, NIN-032, NIN-033: random moves, one in three halted somewhere: where the platform is, is what the firmware
+ * says */
 static void test_the_platform_stands_where_it_was_sent(void)
 {
     begin_linkage();

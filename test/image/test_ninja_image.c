@@ -1,5 +1,5 @@
-/* NIN on the whole image: build/ninja.elf on the board. Coil patterns as edges of their pins; the head's sensors are scripted by
- * its step counts. */
+/* NIN on the whole image: build/ninja.elf on the board. Coil patterns as edges of their pins; the head's sensors are
+ * scripted by its step counts. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdarg.h>
@@ -115,7 +115,8 @@ static uint64_t cycle_of(uint8_t axis, int what, size_t which)
 static void assert_near(const char *what, uint64_t expected, uint64_t seen, uint64_t tolerance)
 {
     char text[200];
-    snprintf(text, sizeof text, "%s: expected %" PRIu64 " cycles within %" PRIu64 ", saw %" PRIu64, what, expected, tolerance, seen);
+    snprintf(text, sizeof text, "%s: expected %" PRIu64 " cycles within %" PRIu64 ", saw %" PRIu64, what, expected,
+             tolerance, seen);
     TEST_ASSERT_TRUE_MESSAGE(seen + tolerance >= expected && seen <= expected + tolerance, text);
 }
 
@@ -200,7 +201,8 @@ void tearDown(void)
 
 /* -- centring ------------------------------------------------------------------------------------------------------ */
 
-/* NIN-017, NIN-018: one axis after the other; the last step of each is the one that changes its sensor, upwards and slowly */
+/* NIN-017, NIN-018: one axis after the other; the last step of each is the one that changes its sensor, upwards and
+ * slowly */
 static void test_at_power_up_it_centres(void)
 {
     const long starts[][2] = {{-40, -30}, {40, 30}, {1700, -500}, {1, 0}};
@@ -313,7 +315,8 @@ static void test_a_late_planner_loses_no_step(void)
     const uint64_t then = board_cycle(nano);
     rest(SECOND);
     TEST_ASSERT_EQUAL(6, count_of(AXIS_X, UP));
-    assert_near("first interval", (uint64_t)(16e6 * sqrt(2.0 / NINJA_ACCELERATION)), cycle_of(AXIS_X, UP, 1) - then, MS / 4);
+    assert_near("first interval", (uint64_t)(16e6 * sqrt(2.0 / NINJA_ACCELERATION)), cycle_of(AXIS_X, UP, 1) - then,
+                MS / 4);
     TEST_ASSERT_EQUAL(1, count_of(AXIS_X, OFF));
 }
 
@@ -352,8 +355,8 @@ static void test_all_velocities(void)
         while (count_of(AXIS_X, OFF) == 0)
             run(MS);
         const size_t middle = (size_t)steps / 2;
-        assert_near(line, (uint64_t)(16e6 / (8 * pow(62.5, v / 63.0))), cycle_of(AXIS_X, UP, middle) - cycle_of(AXIS_X, UP, middle - 1),
-                    JITTER);
+        assert_near(line, (uint64_t)(16e6 / (8 * pow(62.5, v / 63.0))),
+                    cycle_of(AXIS_X, UP, middle) - cycle_of(AXIS_X, UP, middle - 1), JITTER);
         rest(5 * SECOND);
     }
 }
@@ -377,6 +380,46 @@ static void test_a_pause_begins_when_motion_is_over(void)
     say("X10V63MP3X0M");
     run(5 * SECOND);
     assert_near("pause", 300 * MS, cycle_of(AXIS_X, ON, 1) - cycle_of(AXIS_X, OFF, 0), MS);
+}
+
+/* NIN-029 */
+static void test_sensors_are_for_centring_alone(void)
+{
+    home();
+    say("X300Y-200V63M");
+    for (int i = 0; i < 200; i++) {
+        for (uint8_t axis = 0; axis < AXES; axis++)
+            axes[axis].stuck = i >> axis & 1;
+        run(5 * MS);
+    }
+    rest(5 * SECOND);
+    TEST_ASSERT_EQUAL(axes[AXIS_X].edge + 300, axes[AXIS_X].steps);
+    TEST_ASSERT_EQUAL(axes[AXIS_Y].edge - 200 - NINJA_BACKLASH_Y, axes[AXIS_Y].steps);
+}
+
+/* NIN-014: what a move of both axes at top speed takes of the processor */
+static void test_the_processor_has_room(void)
+{
+    enum { TIMER1_COMPA = 11 };
+    uint16_t path_next;
+    home();
+    say("X701Y-333V63M");
+    board_measures_clear(nano);
+    uint64_t longest = 0;
+    if (board_symbol(nano, "path_next", &path_next)) { /* unless the compiler has drawn it into its caller */
+        while (board_run_to_pc(nano, path_next, 100 * MS) == BOARD_MATCHED) {
+            const uint64_t begun = board_cycle(nano);
+            TEST_ASSERT_EQUAL(BOARD_MATCHED, board_run_past(nano, path_next, 100 * MS));
+            if (board_cycle(nano) - begun > longest)
+                longest = board_cycle(nano) - begun;
+        }
+    }
+    rest(5 * SECOND);
+    const board_measures_t *seen = board_measures(nano);
+    printf("step interrupt %u cycles at most, planning %" PRIu64 ", %.0f %% of the time asleep\n",
+           seen->isr[TIMER1_COMPA].cycles_max, longest, 100. * (double)seen->sleep_cycles / (double)seen->cycles);
+    TEST_ASSERT_LESS_THAN(400, seen->isr[TIMER1_COMPA].cycles_max);
+    TEST_ASSERT_LESS_THAN(2 * MS, longest); /* a step at top speed */
 }
 
 /* -- halt ---------------------------------------------------------------------------------------------------------- */
@@ -476,6 +519,8 @@ int main(void)
     RUN_TEST(test_all_velocities);
     RUN_TEST(test_the_slowest_moves_are_even);
     RUN_TEST(test_a_pause_begins_when_motion_is_over);
+    RUN_TEST(test_sensors_are_for_centring_alone);
+    RUN_TEST(test_the_processor_has_room);
     RUN_TEST(test_a_halt_takes_effect_within_an_interval);
     RUN_TEST(test_a_halt_needs_no_main_loop);
     RUN_TEST(test_the_line_is_only_listened_to);

@@ -1,10 +1,10 @@
 /* Both motors, by compare matches of Timer1, which runs freely at 0.5 us a tick.
  *
- * A wait ends at a compare match; the next one is counted from there, whenever the interrupt comes. Waits of 65,536 ticks and
- * more are a rest of 32,768 to 65,535 and chunks of 32,768: no match is ever set closer than 1 ms ahead, so none is
- * missed.
- * Shared:  between the main loop and the interrupt; who writes what stands at each variable. The main loop writes those that
- *          are the interrupt's only while it is disabled (OCIE1A is 0).
+ * A wait ends at a compare match; the next one is counted from there, whenever the interrupt comes. Waits of 65,536
+ * ticks and more are a rest of 32,768 to 65,535 and chunks of 32,768: no match is ever set closer than 1 ms ahead, so
+ * none is missed.
+ * Shared:  between the main loop and the interrupt; who writes what stands at each variable. The main loop writes
+ *          those that are the interrupt's only while it is disabled (OCIE1A is 0).
  * Source:  ATmega328P datasheet DS40002061, 16.9.1 (normal mode), 16.3 (16-bit registers). */
 #include <avr/interrupt.h>
 #include <avr/io.h>
@@ -31,7 +31,7 @@ static volatile uint8_t tail;  /* interrupt: where the next one is taken; equal:
 static volatile bool halted;   /* main loop sets it, start clears it */
 static uint8_t chunks;         /* interrupt: left of the present wait */
 static uint8_t action;         /* interrupt: what follows it; 0: nothing, it is a wait for the main loop */
-static uint16_t counts[AXES];  /* interrupt: steps */
+static volatile uint16_t counts[AXES]; /* interrupt: steps */
 
 static const uint8_t patterns[4] = {0x3, 0x6, 0xC, 0x9}; /* AB, BC, CD, DA */
 

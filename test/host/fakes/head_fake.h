@@ -1,5 +1,5 @@
-/* The Ninja's head without hardware: the stepper plays its waits when told to, each sensor is low from one motor count on.
- * And the whole firmware above its ports, polled until it has nothing left to do. */
+/* The Ninja's head without hardware: the stepper plays its waits when told to, each sensor is low from one motor
+ * count on. And the whole firmware above its ports, polled until it has nothing left to do. */
 #ifndef HEAD_FAKE_H
 #define HEAD_FAKE_H
 
