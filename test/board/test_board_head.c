@@ -103,7 +103,6 @@ static void test_each_axis_follows_its_own_coils(void)
     assert_in_order(HEAD_Y);
 }
 
-/* NIN-032, NIN-033 */
 static void test_motor_turns_through_the_backlash_before_the_platform_moves(void)
 {
     static const int backlash[HEAD_AXES] = {12, 6};
@@ -299,7 +298,6 @@ static void test_rotor_slips_at_the_stops(void)
     }
 }
 
-/* NIN-017 */
 static void test_sensor_is_low_at_the_centre_and_beyond_on_the_positive_side(void)
 {
     write(PORTB, 0x03);

@@ -259,7 +259,7 @@ class AtTheTerminal(unittest.TestCase):
             self.assertNotIn("lost", rows)
 
     def test_typed_bytes_move_it_and_are_shown(self):
-        with Screen("--start", "0,0") as s:
+        with Screen("--start", "0,0", "--speed", "0.2") as s:  # slow enough to be seen on a busy machine
             s.await_text(r"Y +-5 steps")
             s.send(b"x")
             s.await_text(r"X +-\d+ steps .* coils (AB--|-BC-|--CD|A--D) .* -(99|100)\.\d steps/s")
@@ -368,6 +368,16 @@ class Firmware(unittest.TestCase):
             s.await_text(r"X +0 steps(.|\n)*Y +0 steps")
             s.send(b"X-200Y100S")
             s.await_text(r"X +-200 steps +-20.0 deg +coils ----(.|\n)*Y +100 steps +10.0 deg +coils ----")
+
+    def test_halt_at_the_terminal_and_resume(self):
+        with Screen("--start", "0,0", image=FIRMWARE) as s:
+            s.await_text(r"X +0 steps .* coils ---- .* [1-9]\d* made(.|\n)*Y +0 steps .* coils ---- .* [1-9]\d* made")
+            s.send(b"X600M")
+            s.await_text(r"X +[1-5]\d\d steps")
+            s.send(b"\x7f")
+            s.await_text(r"X +[1-5]\d\d steps .* coils ----")
+            s.send(b"S")
+            self.assertNotIn("lost", s.await_text(r"X +600 steps .* coils ----"))
 
 
 if __name__ == "__main__":

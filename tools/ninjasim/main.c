@@ -44,6 +44,7 @@ static struct {
     int64_t notice_until_ns, next_show_ns, speed_since_ns;
     uint64_t speed_since_cycle;
     double speed;
+    size_t bytes_noticed; /* that the board has sent */
 
     bool done;
     int code;
@@ -123,8 +124,9 @@ static void show(int64_t now)
         sim.speed_since_cycle = board_cycle(sim.board);
     }
     view.speed = sim.speed;
-    if (bytes_sent_by_the_board() > 0) {
-        notice("the Nano has sent %zu bytes: it should be silent", bytes_sent_by_the_board());
+    if (bytes_sent_by_the_board() != sim.bytes_noticed) {
+        sim.bytes_noticed = bytes_sent_by_the_board();
+        notice("the Nano has sent %zu bytes: it should be silent", sim.bytes_noticed);
     }
     if (now < sim.notice_until_ns) {
         view.notice = sim.notice;
@@ -322,7 +324,7 @@ int main(int argc, char **argv)
     if (open_all()) {
         run();
         if (sim.screen) {
-            screen_close(); /* once more does no harm */
+            screen_close();
         }
         print_state();
     } else {

@@ -13,8 +13,8 @@ enum { KEY_BACKLASH = 256, KEY_STUCK, KEY_SPEED, KEY_LINGER, KEY_SCRIPT, KEY_WAI
 const char *argp_program_version = "ninjasim 1.0 - a simulated pan and tilt head on an Arduino Nano (ATmega328P, 16 MHz)";
 
 static const char doc[] =
-    "Runs the Ninja's firmware on a simulated Arduino Nano with a simulated pan and tilt head, in real time: what is typed "
-    "goes to its serial port, the head is drawn.\v"
+    "Runs the Ninja's firmware on a simulated Arduino Nano with a simulated pan and tilt head, in real time: what is "
+    "typed goes to its serial port, the head is drawn.\v"
     "Backspace halts, Ctrl-R resets. Ctrl-C or Ctrl-] q quits; Ctrl-] ? lists the other keys: reset button, power, sensors.\n"
     "\n"
     "With --script, or where the input is a pipe or a file, nothing is drawn: the bytes are typed once the head rests after "
