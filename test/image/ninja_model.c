@@ -136,7 +136,7 @@ static void begin_move(ninja_model_t *m, uint32_t step_us)
     m->move.on = m->now;
     m->move.due_at = 0;
     all_due(m, NINJA_ON);
-    m->begun = m->now;
+    m->started = m->now;
     m->moves++;
 }
 
@@ -356,7 +356,7 @@ static void settle(ninja_model_t *m)
 
 static void halt(ninja_model_t *m)
 {
-    if (m->now - m->settled < BUSY || m->now - m->begun < BUSY)
+    if (m->now - m->settled < BUSY || m->now - m->started < BUSY)
         m->unclear++;
     m->halts++;
     if (m->move.begins) {

@@ -83,7 +83,7 @@ typedef struct {
         bool due[AXES];
     } move;
 
-    uint64_t begun;     /* a move, last */
+    uint64_t started;   /* a move, last */
     uint64_t settled;   /* when something ended by itself last */
     bool was_full;      /* the FIFO, then */
     uint64_t dropped;   /* when a byte was lost last */
