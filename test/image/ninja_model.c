@@ -109,7 +109,7 @@ static double law(unsigned k)
 static double interval(const ninja_model_t *m, unsigned k)
 {
     const double start = NINJA_START_INTERVAL;
-    return m->move.cruise >= start
+    return floor((double)SECOND / m->move.cruise) <= NINJA_START_STEPS_PER_S
                ? m->move.cruise
                : fmax(m->move.cruise, fmax(law(k), fmin(start, law(m->move.most - 1 - k))));
 }

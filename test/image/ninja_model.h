@@ -13,8 +13,8 @@
  * number, and nothing behind it is interpreted until the pause is over. A sign counts right behind the letter, once. ) in a
  * macro that runs ends it.
  * Time:    the major axis has constant acceleration from a standstill, with sqrt(2/a) (sqrt(k+1) - sqrt(k)) behind step k (from 0);
- *          it ends likewise, but with no interval longer than that of the start speed; none is shorter than that of V. What is
- *          no faster than the start speed has no ramps.
+ *          it ends likewise, but with no interval longer than that of the start speed; none is shorter than that of V. A
+ *          velocity of as many whole steps a second as the start speed, or fewer, has no ramps.
  * Units:   cycles of 62.5 ns; steps; tenths of a second.
  * Source:  seed lines N1-128; decisions 0.5, A-NIN-02 to -16. */
 #ifndef TEST_IMAGE_NINJA_MODEL_H

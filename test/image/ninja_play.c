@@ -1,7 +1,6 @@
 /* See ninja_play.h. */
 #include "ninja_play.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 #define SLICE (20 * MS)
@@ -43,7 +42,6 @@ static void tell(void)
             fits = ninja_model_byte(&play_model, typed[bytes_told].cycle, typed[bytes_told].byte);
             bytes_told++;
         } else if (events_told < count) {
-            if (getenv("DBG")) printf("%.6f %c %s  own %d/%d real %d/%d\n", (double)event[events_told].cycle / 16e6, "XY"[event[events_told].axis], ninja_names[event[events_told].what], play_model.own[0].position, play_model.own[0].slack, play_model.real[0].position, play_model.real[0].slack);
             fits = ninja_model_event(&play_model, &event[events_told++]);
         } else {
             fits = ninja_model_until(&play_model, now);
