@@ -64,8 +64,8 @@ static void settle(void)
             motors[axis].n--;
             note(edge_cycle, axis, NINJA_DOWN);
         } else if (wrong[0] == '\0') {
-            snprintf(wrong, sizeof wrong, "%c: coils 0x%X after 0x%X, motor count %d, at cycle %" PRIu64, "XY"[axis], now, before,
-                     motors[axis].n, edge_cycle);
+            snprintf(wrong, sizeof wrong, "%c: coils 0x%X after 0x%X, motor count %d, at cycle %" PRIu64, "XY"[axis],
+                     now, before, motors[axis].n, edge_cycle);
         }
     }
 }
@@ -127,6 +127,14 @@ uint64_t ninja_cycle(uint8_t axis, ninja_what_t what, size_t which)
 uint64_t ninja_last(uint8_t axis, ninja_what_t what)
 {
     return ninja_cycle(axis, what, ninja_count(axis, what) - 1);
+}
+
+void ninja_await(uint8_t axis, ninja_what_t what, size_t count, uint64_t most)
+{
+    for (const uint64_t end = board_cycle(board) + most; ninja_count(axis, what) < count; image_run(MS))
+        if (board_cycle(board) > end)
+            image_fail("%c %s: expected %zu by cycle %" PRIu64 ", saw %zu", "XY"[axis], ninja_names[what], count, end,
+                       ninja_count(axis, what));
 }
 
 int ninja_made(uint8_t axis)
@@ -234,7 +242,8 @@ int ninja_platform(uint8_t axis)
 {
     const head_state_t *state = head_state(ninja_head, axis == AXIS_X ? HEAD_X : HEAD_Y);
     if (state->lost_steps != 0 || state->wrong_patterns != 0)
-        image_fail("%c: %" PRIu64 " steps lost, %" PRIu64 " wrong patterns", "XY"[axis], state->lost_steps, state->wrong_patterns);
+        image_fail("%c: %" PRIu64 " steps lost, %" PRIu64 " wrong patterns", "XY"[axis], state->lost_steps,
+                   state->wrong_patterns);
     return state->platform;
 }
 

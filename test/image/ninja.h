@@ -1,9 +1,9 @@
-/* For the tests of the Ninja's image: a board that runs build/ninja.elf with a head on it, somebody who types at 4,800 baud, an
- * oscilloscope on the coils. What image.h offers for any image may be used besides: time, typing, failing.
+/* For the tests of the Ninja's image: a board that runs build/ninja.elf with a head on it, somebody who types at 4,800
+ * baud, an oscilloscope on the coils. What image.h offers for any image may be used besides: time, typing, failing.
  *
  * Units:   cycles of 62.5 ns; steps. Axes as in firmware/ninja/stepper_port.h: AXIS_X is azimuth, AXIS_Y altitude.
- * Errors:  what goes wrong fails the running test: a pattern that is not n modulo 4 (n: steps of that motor since power-up, in its
- *          direction), a falling edge on the transmitter's pin, a step that the head's motor could not follow.
+ * Errors:  what goes wrong fails the running test: a pattern that is not n modulo 4 (n: steps of that motor since
+ *          power-up, those up less those down), a transmitter at work, a step that the head's motor could not follow.
  * One board at a time: ninja_power_on() makes it, ninja_off() (in tearDown) takes it away. */
 #ifndef TEST_IMAGE_NINJA_H
 #define TEST_IMAGE_NINJA_H
@@ -50,6 +50,7 @@ void ninja_forget(void);
 size_t ninja_count(uint8_t axis, ninja_what_t what);
 uint64_t ninja_cycle(uint8_t axis, ninja_what_t what, size_t which); /* of the event number `which` of these */
 uint64_t ninja_last(uint8_t axis, ninja_what_t what);
+void ninja_await(uint8_t axis, ninja_what_t what, size_t count, uint64_t most); /* so many of these; to a millisecond */
 int ninja_made(uint8_t axis); /* steps up less steps down */
 
 /* -- the head ------------------------------------------------------------------------------------------------------ */

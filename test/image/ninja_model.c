@@ -37,7 +37,7 @@ static const struct {
 };
 #define LEGS (sizeof legs / sizeof legs[0])
 
-static bool complain(ninja_model_t *m, const char *format, ...) __attribute__((format(printf, 2, 3)));
+__attribute__((format(printf, 2, 3)))
 static bool complain(ninja_model_t *m, const char *format, ...)
 {
     if (m->complaint[0] == '\0') {
@@ -52,7 +52,8 @@ static bool complain(ninja_model_t *m, const char *format, ...)
 
 uint32_t ninja_v_us(int v)
 {
-    return RATE(NINJA_CREEP_STEPS_PER_S * pow((double)NINJA_TOP_STEPS_PER_S / NINJA_CREEP_STEPS_PER_S, v / (double)V_TOP));
+    const double ratio = (double)NINJA_TOP_STEPS_PER_S / NINJA_CREEP_STEPS_PER_S;
+    return RATE(NINJA_CREEP_STEPS_PER_S * pow(ratio, v / (double)V_TOP));
 }
 
 static int saturated(long value, int min, int max)
@@ -71,8 +72,8 @@ static void turn(ninja_linkage_t *linkage, int backlash, int direction)
         linkage->slack = slack;
 }
 
-/* At power-up a rotor may stand between the positions that A+B pulls it to, the multiples of 4: it is drawn to the next one (from
- * the middle upwards, as the head's is). */
+/* At power-up a rotor may stand between the positions that A+B pulls it to, the multiples of 4: it is drawn to the next
+ * one (from the middle upwards, as the head's is). */
 static void align(ninja_model_t *m, uint8_t axis)
 {
     static const int way[] = {0, -1, 2, 1};
@@ -86,7 +87,8 @@ static void align(ninja_model_t *m, uint8_t axis)
 
 static bool sensor_low(const ninja_model_t *m, uint8_t axis)
 {
-    return m->sensor[axis] == HEAD_SENSOR_STUCK_LOW || (m->sensor[axis] == HEAD_SENSOR_WORKS && m->real[axis].position >= 0);
+    const head_sensor_t sensor = m->sensor[axis];
+    return sensor == HEAD_SENSOR_STUCK_LOW || (sensor == HEAD_SENSOR_WORKS && m->real[axis].position >= 0);
 }
 
 /* -- moves --------------------------------------------------------------------------------------------------------- */
@@ -101,7 +103,8 @@ static bool leg_done(const ninja_model_t *m)
 static double law(unsigned k)
 {
     static const double rad = 2 * 3.14159265358979 / 60;
-    const double acceleration = round(NINJA_ACCELERATION * rad) / rad; /* whole rad/s^2 at 60 steps per revolution (constants.h) */
+    /* Whole rad/s^2, at 60 steps per revolution (constants.h). */
+    const double acceleration = round(NINJA_ACCELERATION * rad) / rad;
     return (double)SECOND * sqrt(2 / acceleration) * (sqrt(k + 1.0) - sqrt(k));
 }
 
@@ -446,7 +449,8 @@ bool ninja_model_until(ninja_model_t *m, uint64_t cycle)
     if (m->move.runs && (double)cycle > last) {
         const uint8_t axis = m->move.due[AXIS_X] ? AXIS_X : AXIS_Y;
         return complain(m, "expected %c %s at %.0f, after %u of %u steps; it did not come", "XY"[axis],
-                        m->move.halted ? "off (halted)" : ninja_names[m->move.what[axis]], last, m->move.made, m->move.most);
+                        m->move.halted ? "off (halted)" : ninja_names[m->move.what[axis]], last, m->move.made,
+                        m->move.most);
     }
     return m->complaint[0] == '\0';
 }
@@ -460,7 +464,8 @@ bool ninja_model_event(ninja_model_t *m, const ninja_event_t *event)
     if (event->what == NINJA_OFF && m->move.halted && m->move.what[event->axis] != NINJA_OFF)
         all_due(m, NINJA_OFF); /* instead of the step */
     if (!m->move.runs || !m->move.due[event->axis])
-        return complain(m, "%c %s was not expected (%s)", axis, name, m->move.runs ? "the other axis was" : "no move");
+        return complain(m, "%c %s was not expected (%s)", axis, name,
+                        m->move.runs ? "the other axis was" : "no move");
     const bool on_its_way = event->what == NINJA_OFF || event->cycle < m->move.halt_cycle + HALT_CYCLES;
     if (event->what != m->move.what[event->axis] || (m->move.halted && !on_its_way))
         return complain(m, "expected %c %s%s, saw %s, step %u of %u", axis, ninja_names[m->move.what[event->axis]],
@@ -468,8 +473,8 @@ bool ninja_model_event(ninja_model_t *m, const ninja_event_t *event)
     double first, last;
     window(m, &first, &last);
     if ((double)event->cycle < first)
-        return complain(m, "%c %s comes %.1f us too early, step %u of %u", axis, name, (first - (double)event->cycle) / US,
-                        m->move.made, m->move.most);
+        return complain(m, "%c %s comes %.1f us too early, step %u of %u", axis, name,
+                        (first - (double)event->cycle) / US, m->move.made, m->move.most);
     if (m->move.begins) {
         m->move.begins = false;
         m->move.on = event->cycle;

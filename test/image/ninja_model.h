@@ -1,20 +1,21 @@
-/* The Ninja as its seed and the decisions describe it, apart from the firmware: FIFO, numbers, macros, moves with backlash, pauses,
- * centring, halts.
+/* The Ninja as its seed and the decisions describe it, apart from the firmware: FIFO, numbers, macros, moves with
+ * backlash, pauses, centring, halts.
  *
- * It is told what went in (bytes) and what came out (coils on and off, steps), in order of time, and complains of the first thing
- * that it cannot explain: it knows what each axis does next, and when, to some microseconds. Only a halt is a matter of what has
- * been seen: up to it so many steps of the path as were made, none behind it, and the coils off where the next one would have
- * been. What begins takes up to NINJA_LATENCY.
+ * It is told what went in (bytes) and what came out (coils on and off, steps), in order of time, and complains of the
+ * first thing that it cannot explain: it knows what each axis does next, and when, to some microseconds. Only a halt is a
+ * matter of what has been seen: up to it so many steps of the path as were made, none behind it, and the coils off where
+ * the next one would have been. What begins takes up to NINJA_LATENCY.
  *
  * Where two things come so close together that either may have been first (a byte for a full FIFO at the end of a move; a
- * halt right behind one), the model goes on as it is and counts one unclear case more: what it says from then on is worth nothing.
+ * halt right behind one), the model goes on as it is and counts one unclear case more: what it says from then on is worth
+ * nothing.
  *
- * How it reads what the decisions leave open: a waiting M, S, I or C stays in the FIFO; P has left it, but not the byte behind its
- * number, and nothing behind it is interpreted until the pause is over. A sign counts right behind the letter, once. ) in a
- * macro that runs ends it.
- * Time:    the major axis has constant acceleration from a standstill, with sqrt(2/a) (sqrt(k+1) - sqrt(k)) behind step k (from 0);
- *          it ends likewise, but with no interval longer than that of the start speed; none is shorter than that of V. A
- *          velocity of as many whole steps a second as the start speed, or fewer, has no ramps.
+ * How it reads what the decisions leave open: a waiting M, S, I or C stays in the FIFO; P has left it, but not the byte
+ * behind its number, and nothing behind it is interpreted until the pause is over. A sign counts right behind the letter,
+ * once. ) in a macro that runs ends it.
+ * Time:    the major axis has constant acceleration from a standstill, with sqrt(2/a) (sqrt(k+1) - sqrt(k)) behind step
+ *          k (from 0); it ends likewise, but with no interval longer than that of the start speed; none is shorter than
+ *          that of V. A velocity of as many whole steps a second as the start speed, or fewer, has no ramps.
  * Units:   cycles of 62.5 ns; steps; tenths of a second.
  * Source:  seed lines N1-128; decisions 0.5, A-NIN-02 to -16. */
 #ifndef TEST_IMAGE_NINJA_MODEL_H

@@ -1,13 +1,13 @@
 /* What can be typed at the Ninja's image, one rule at a time; and random bytes.
  *
- * SAC_NINJA_BYTES=n: so many random bytes of each kind instead of 2,500. */
+ * SAC_NINJA_BYTES=n: so many random bytes of each kind instead of 1,500. */
 #include "ninja.h"
 #include "splitmix64.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#define RANDOM_BYTES 2500
+#define RANDOM_BYTES 1500
 #define LONGEST_INTERVAL (125 * MS)
 
 void setUp(void)
@@ -35,7 +35,8 @@ static void assert_cases(const case_t *cases, size_t count)
         const int x = ninja_platform(AXIS_X);
         const int y = ninja_platform(AXIS_Y);
         if (x != cases[i].x || y != cases[i].y)
-            image_fail("\"%s\": expected the platform at %d,%d, saw %d,%d", cases[i].text, cases[i].x, cases[i].y, x, y);
+            image_fail("\"%s\": expected the platform at %d,%d, saw %d,%d", cases[i].text, cases[i].x, cases[i].y, x,
+                       y);
     }
 }
 #define ASSERT_CASES(...) \
@@ -117,8 +118,8 @@ static void test_sixteen_bytes_wait(void)
 /* NIN-008 */
 static void test_other_characters_are_ignored(void)
 {
-    ASSERT_CASES({"X100,?Y5 M", 100, 5}, {"\r\nX5\r\nY6\r\nM\r\n", 5, 6}, {"QWTUabdefghjkl~!@#$%^&*=X9M", 9, 6}, {"12X8 99M", 8, 6},
-                 {"\x80\xff\x7f\x01\x1bX7M", 7, 6}, {"X1-2M", 1, 6}, {"X--5M", 0, 6});
+    ASSERT_CASES({"X100,?Y5 M", 100, 5}, {"\r\nX5\r\nY6\r\nM\r\n", 5, 6}, {"QWTUabdefghjkl~!@#$%^&*=X9M", 9, 6},
+                 {"12X8 99M", 8, 6}, {"\x80\xff\x7f\x01\x1bX7M", 7, 6}, {"X1-2M", 1, 6}, {"X--5M", 0, 6});
 }
 
 /* NIN-011: X and Y move nothing, and stay */
@@ -142,8 +143,8 @@ static void test_x_and_y_move_nothing(void)
 /* NIN-016: relative; X and Y become where it leads */
 static void test_increments_are_relative(void)
 {
-    ASSERT_CASES({"X10Y0I", 10, 0}, {"M", 10, 0}, {"I", 20, 0}, {"X-5Y7I", 15, 7}, {"X1800Y550I", 1800, 550}, {"X-5Y-5I", 1795, 545},
-                 {"X0Y0I", 1795, 545}, {"X-1800Y-1200I", -5, -655}, {"X-1800Y-1200I", -1800, -1200});
+    ASSERT_CASES({"X10Y0I", 10, 0}, {"M", 10, 0}, {"I", 20, 0}, {"X-5Y7I", 15, 7}, {"X1800Y550I", 1800, 550},
+                 {"X-5Y-5I", 1795, 545}, {"X0Y0I", 1795, 545}, {"X-1800Y-1200I", -5, -655}, {"X-1800Y-1200I", -1800, -1200});
 }
 
 /* NIN-015, NIN-019: P waits for the end of motion, then so many tenths of a second */
@@ -160,7 +161,8 @@ static void test_pauses_are_tenths_of_a_second(void)
         ninja_rest(5 * SECOND);
         const uint64_t off = ninja_cycle(AXIS_X, NINJA_OFF, 0);
         TEST_ASSERT_EQUAL(0, ninja_platform(AXIS_X));
-        image_assert_near("pause in ms", tenths[i] * 100.0 + 0.3, (double)(ninja_cycle(AXIS_X, NINJA_ON, 1) - off) / MS, 0.5);
+        const double pause = (double)(ninja_cycle(AXIS_X, NINJA_ON, 1) - off) / MS;
+        image_assert_near("pause in ms", tenths[i] * 100.0 + 0.3, pause, 0.5);
     }
 }
 
@@ -169,7 +171,8 @@ static void test_pauses_are_tenths_of_a_second(void)
 /* NIN-020, NIN-022, NIN-023: not executed until R; what follows ) is */
 static void test_a_macro_is_kept_and_run(void)
 {
-    ASSERT_CASES({"X5(X20MY10MX-1M)", 0, 0}, {"M", 5, 0}, {"R", -1, 10}, {"X3Y3S", 3, 3}, {"r", -1, 10}, {"(C)X0Y0M", 0, 0});
+    ASSERT_CASES({"X5(X20MY10MX-1M)", 0, 0}, {"M", 5, 0}, {"R", -1, 10}, {"X3Y3S", 3, 3}, {"r", -1, 10},
+                 {"(C)X0Y0M", 0, 0});
     ninja_forget();
     ninja_type("(X20MX0MY15MY0M)RX8M"); /* X8M waits for its end */
     ninja_rest(10 * SECOND);
@@ -194,7 +197,8 @@ static void type_slowly(const char *text)
     }
 }
 
-/* NIN-021: 21 commands of three bytes and ) fill it; a command more is left out, however short; a number takes two bytes however long */
+/* NIN-021: 21 commands of three bytes and ) fill it; a command more is left out, however short; a number takes two bytes
+ * however long it is */
 static void test_a_macro_has_64_bytes(void)
 {
     static const char three[] = "X1X2X3X4X5X6X7X8X9X10X11X12X13X14X15X16X17X18X19";
@@ -228,8 +232,7 @@ static void test_a_macro_repeats_itself(void)
 {
     ninja_home();
     ninja_type("V63(X20MX0MR)R");
-    while (ninja_count(AXIS_X, NINJA_ON) < 7)
-        image_run(100 * MS);
+    ninja_await(AXIS_X, NINJA_ON, 7, 10 * SECOND);
     ninja_type("\b");
     ninja_rest(SECOND);
     const size_t before = ninja_count(AXIS_X, NINJA_ON);
@@ -239,8 +242,7 @@ static void test_a_macro_repeats_itself(void)
     ninja_rest(SECOND);
     ninja_forget();
     ninja_type("R");
-    while (ninja_count(AXIS_X, NINJA_OFF) == 0)
-        image_run(MS);
+    ninja_await(AXIS_X, NINJA_OFF, 1, 5 * SECOND);
     ninja_assert_at(20, 0); /* from its beginning */
     ninja_type("X5X5X5"); /* waits for ever */
     image_run(3 * SECOND);
@@ -286,7 +288,8 @@ static void watch(uint64_t cycles)
     }
 }
 
-/* NIN-002, NIN-008, NIN-009, NIN-010, NIN-030: of all kinds, and such as are commands; at the end it can be halted, and used */
+/* NIN-002, NIN-008, NIN-009, NIN-010, NIN-030: of all kinds, and such as are commands; at the end it can be halted, and
+ * used */
 static void test_random_bytes_do_no_harm(void)
 {
     static const char likely[] = "XYVMSICP()R0123456789-xym\b";

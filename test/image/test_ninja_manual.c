@@ -1,7 +1,7 @@
 /* The examples of docs/ninja.md, each at a head that has just been centred, and its tables.
  *
  * In a block that begins with ```ninja each line is typed, without an end of line. One that begins with "... " is not:
- *   at X,Y [after N s]         the head comes to rest there, and its last coil goes off so long after the last byte, to 0.1 s
+ *   at X,Y [after N s]         the head comes to rest there, its last coil goes off so long after the last byte (+-50 ms)
  *   N s later                  time passes
  *   coils on, coils off        they are
  *   X makes N steps, Y M       the head comes to rest; so many since the line before that was typed

@@ -97,8 +97,14 @@ static double off_line(const move_t *move)
     return worst;
 }
 
+/* Of so many steps in that time; below the start speed a motor may change it as it likes. */
+static double velocity(double seconds)
+{
+    return most_of(SPAN / seconds, NINJA_START_STEPS_PER_S);
+}
+
 /* Largest acceleration or deceleration, from the middle of some intervals to that of the next ones: one step's few
- * microseconds of jitter are nothing then. (That each single one is right, to its jitter, is test_a_long_move_has_both_ramps.) */
+ * microseconds of jitter are nothing then. (test_a_long_move_has_both_ramps looks at each single one.) */
 static double acceleration(const move_t *move)
 {
     double worst = 0;
@@ -107,7 +113,7 @@ static double acceleration(const move_t *move)
     for (size_t k = 0; k + 2 * SPAN < steps; k++) {
         const double first = (double)(cycle[k + SPAN] - cycle[k]) / SECOND;
         const double second = (double)(cycle[k + 2 * SPAN] - cycle[k + SPAN]) / SECOND;
-        const double change = most_of(SPAN / second, NINJA_START_STEPS_PER_S) - most_of(SPAN / first, NINJA_START_STEPS_PER_S);
+        const double change = velocity(second) - velocity(first);
         worst = most_of(worst, fabs(change) / ((first + second) / 2));
     }
     return worst;
@@ -140,7 +146,8 @@ static void test_random_moves_are_straight_and_smooth(void)
     for (unsigned i = moves_wanted(); i > 0; i--) {
         char text[40];
         const int reach = i % 4 == 0 ? 1200 : 200;
-        snprintf(text, sizeof text, "X%dY%dV%dM", between(-reach, reach), between(-reach, reach < 550 ? reach : 550), between(24, 63));
+        const int up = reach < NINJA_Y_MAX ? reach : NINJA_Y_MAX;
+        snprintf(text, sizeof text, "X%dY%dV%dM", between(-reach, reach), between(-reach, up), between(24, 63));
         move_t move = make_move(text);
         const size_t steps = move.steps[move.major];
         if (steps == 0)
@@ -148,12 +155,15 @@ static void test_random_moves_are_straight_and_smooth(void)
         line = most_of(line, off_line(&move));
         steepest = most_of(steepest, acceleration(&move));
         if (move.steps[!move.major] != 0) {
-            const uint64_t last = move.cycle[!move.major][move.steps[!move.major] - 1];
-            together = most_of(together, fabs((double)last - (double)move.cycle[move.major][steps - 1]) / SECOND / interval(&move, steps - 1));
+            const uint64_t last = move.cycle[move.major][steps - 1];
+            const uint64_t other = move.cycle[!move.major][move.steps[!move.major] - 1];
+            const double apart = fabs((double)other - (double)last) / SECOND;
+            together = most_of(together, apart / interval(&move, steps - 1));
         }
         forget_move(&move);
     }
-    printf("off the line %.3f steps, last steps %.6f intervals apart, acceleration %.1f steps/s^2\n", line, together, steepest);
+    printf("off the line %.3f steps, last steps %.6f intervals apart, acceleration %.1f steps/s^2\n", line, together,
+           steepest);
     TEST_ASSERT_TRUE_MESSAGE(line <= 1, "off the straight line");
     TEST_ASSERT_TRUE_MESSAGE(together < 1, "the axes do not end together");
     TEST_ASSERT_TRUE_MESSAGE(steepest < 1.02 * NINJA_ACCELERATION, "too steep");
@@ -184,7 +194,8 @@ static void test_each_velocity_has_its_rate(void)
 /* NIN-012: V stays, and what is outside 0..63 is 63 */
 static void test_a_velocity_outside_is_the_highest(void)
 {
-    static const char *const outside[] = {"V63X500M", "X0M", "V99X500M", "V0V-1X0M", "V0V64X500M", "V0V65535X0M", "V0V99999X500M"};
+    static const char *const outside[] = {"V63X500M",   "X0M",         "V99X500M",     "V0V-1X0M",
+                                          "V0V64X500M", "V0V65535X0M", "V0V99999X500M"};
     ninja_home();
     for (size_t i = 0; i < sizeof outside / sizeof outside[0]; i++) {
         move_t move = make_move(outside[i]);
@@ -203,12 +214,12 @@ static void test_a_slew_is_fast_and_leaves_v(void)
         image_assert_near("S: interval in us", 2000, shortest(&slew) * 1e6, 6);
         forget_move(&slew);
         move_t move = make_move(i ? "X0M" : "X300M");
-        image_assert_near("M: interval in us", 1e6 / (8 * pow(62.5, 30 / 63.0)), shortest(&move) * 1e6, 6);
+        image_assert_near("M: interval in us", ninja_v_us(30), shortest(&move) * 1e6, 6);
         forget_move(&move);
     }
 }
 
-/* NIN-031: from a standstill, to the top, and back to the start speed; coils on before and after for an interval of that */
+/* NIN-031: from a standstill, to the top, and back to the start speed; coils on before and after for an interval of it */
 static void test_a_long_move_has_both_ramps(void)
 {
     ninja_home();
@@ -219,7 +230,8 @@ static void test_a_long_move_has_both_ramps(void)
     for (size_t k = 0; k < 124; k++) {
         const double law = sqrt(2 / 1002.68) * (sqrt((double)k + 1) - sqrt((double)k));
         image_assert_near("acceleration: interval in us", law * 1e6, interval(&move, k) * 1e6, 6);
-        image_assert_near("deceleration: interval in us", fmin(law, 0.02) * 1e6, interval(&move, steps - 1 - k) * 1e6, 6);
+        image_assert_near("deceleration: interval in us", fmin(law, 0.02) * 1e6,
+                          interval(&move, steps - 1 - k) * 1e6, 6);
     }
     for (size_t k = 126; k < steps - 126; k++)
         image_assert_near("cruise: interval in us", 2000, interval(&move, k) * 1e6, 6);
@@ -270,7 +282,8 @@ static void test_a_change_of_direction_takes_up_the_backlash(void)
     ninja_assert_at(0, -1);
 }
 
-/* NIN-026, NIN-032, NIN-033: halts at any moment among them; none of a motor's steps is lost, and the platform ends where it is told to */
+/* NIN-026, NIN-032, NIN-033: halts at any moment among them; none of a motor's steps is lost, and the platform ends where
+ * it is told to */
 static void test_in_a_head_with_backlash_each_move_ends_exactly(void)
 {
     unsigned halts = 0;
@@ -314,7 +327,7 @@ static void test_sensors_do_not_matter_in_a_move(void)
     TEST_ASSERT_EQUAL(1, ninja_count(AXIS_X, NINJA_ON));
 }
 
-/* NIN-030: two coils of an axis that moves, none of one that does not, none at rest (which pattern: ninja.c looks at each) */
+/* NIN-030: two coils of an axis that moves, none of one that does not, none at rest (ninja.c looks at each pattern) */
 static void test_only_what_moves_has_current(void)
 {
     ninja_home();

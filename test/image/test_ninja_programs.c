@@ -1,4 +1,5 @@
-/* The Ninja's image against the model (ninja_model.h): random programs, with halts at random moments and a FIFO that overflows.
+/* The Ninja's image against the model (ninja_model.h): random programs, with halts at random moments and a FIFO that
+ * overflows.
  *
  * SAC_NINJA_PROGRAMS=n: so many instead of 60. SAC_NINJA_SEED=n: that program alone, and what it types. */
 #include "ninja_play.h"
@@ -194,8 +195,8 @@ static bool run_program(void)
     return clear;
 }
 
-/* NIN-003..NIN-012, NIN-014..NIN-016, NIN-019..NIN-028, NIN-030..NIN-033: number and order of steps, patterns, times, pauses, and
- * where it ends */
+/* NIN-003..NIN-012, NIN-014..NIN-016, NIN-019..NIN-028, NIN-030..NIN-033: number and order of steps, patterns, times,
+ * pauses, and where it ends */
 static void test_random_programs_do_what_the_model_says(void)
 {
     const char *programs = getenv("SAC_NINJA_PROGRAMS");
@@ -210,8 +211,8 @@ static void test_random_programs_do_what_the_model_says(void)
     number = 0;
     for (unsigned done = 0; done < wanted; number++)
         done += run_program();
-    printf("%u programs (%u more in which two things were too close together), %.0f s: %u moves, %zu steps and switches, %u halts, "
-           "%u bytes lost, %u pauses\n",
+    printf("%u programs (%u more in which two things were too close together), %.0f s: %u moves, %zu steps and switches, "
+           "%u halts, %u bytes lost, %u pauses\n",
            wanted, sums.unclear, sums.seconds, sums.moves, sums.steps, sums.halts, sums.drops, sums.pauses);
     TEST_ASSERT_LESS_THAN_MESSAGE(wanted / 5 + 2, sums.unclear, "too many programs were unclear");
 }
