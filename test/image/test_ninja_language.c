@@ -213,11 +213,11 @@ static void test_a_macro_has_64_bytes(void)
     type_slowly(text);
     ninja_rest(10 * SECOND);
     ninja_assert_at(-1500, 0);
-    snprintf(text, sizeof text, "(%sX20X-1400MM)R", three); /* the second one is left out, ) too, and still ends it */
+    snprintf(text, sizeof text, "(%sX20X-1400MC)R", three); /* C is left out, ) too, and still ends it */
     type_slowly(text);
     ninja_rest(10 * SECOND);
     ninja_assert_at(-1400, 0);
-    snprintf(text, sizeof text, "(%sX20MMX5M)R", three); /* 62, where X5 does not fit and M does */
+    snprintf(text, sizeof text, "(%sX20MMX5M)RM", three); /* 62, where X5 does not fit and M does */
     type_slowly(text);
     ninja_rest(10 * SECOND);
     ninja_assert_at(20, 0);

@@ -149,10 +149,10 @@ static void do_something(void)
         play_sent();
 }
 
-static head_options_t somewhere(void)
+static head_options_t somewhere(bool far)
 {
     head_options_t head = head_defaults;
-    const int reach = below(20) == 0 ? 500 : 20;
+    const int reach = far ? 500 : 20;
     head.axis[HEAD_X].start = between(-reach, reach);
     head.axis[HEAD_Y].start = between(-reach, reach);
     return head;
@@ -162,9 +162,11 @@ static head_options_t somewhere(void)
 static bool run_program(void)
 {
     seed = number;
-    const head_options_t head = somewhere();
+    /* Where centring may be halted it begins so near the centre that no stop is met. */
+    const bool rests = below(4) != 0;
+    const head_options_t head = somewhere(rests && below(20) == 0);
     play_power_on(&head);
-    if (below(4))
+    if (rests)
         play_rest(20 * SECOND);
     for (unsigned i = 0; i < TOKENS && play_model.unclear == 0; i++)
         do_something();
