@@ -183,7 +183,15 @@ IMAGE_TESTS := test_image_boot test_image_pins test_image_encoder test_image_mot
     test_image_sequence test_image_terminal test_image_stop test_image_configure test_image_powercut test_image_system test_image_timing test_image_clock test_image_stress \
     test_image_estop test_image_ops test_image_processor test_image_fuzz test_image_automicro test_image_manual test_image_bus \
     test_image_network test_image_line test_image_nodes \
-    test_ninja_image
+    test_ninja_image test_ninja_programs test_ninja_motion test_ninja_halt test_ninja_centring \
+    test_ninja_language test_ninja_manual
+NINJA_TEST_SRCS := test/image/ninja.c test/image/ninja_model.c test/image/ninja_play.c
+test_ninja_programs_SRCS := $(NINJA_TEST_SRCS)
+test_ninja_motion_SRCS := $(NINJA_TEST_SRCS)
+test_ninja_halt_SRCS := $(NINJA_TEST_SRCS)
+test_ninja_centring_SRCS := $(NINJA_TEST_SRCS)
+test_ninja_language_SRCS := $(NINJA_TEST_SRCS)
+test_ninja_manual_SRCS := $(NINJA_TEST_SRCS)
 test_image_bus_SRCS := test/image/soft_peer.c
 test_image_network_SRCS := test/image/soft_peer.c test/image/master.c
 test_image_line_SRCS := test/image/soft_peer.c test/image/master.c test/fuzz/grammar.c
@@ -547,6 +555,14 @@ test-network-long: ## 10^5 packets on the image at 33 kHz, 10^4 at 100 kHz, the 
 fuzz-image-long: ## 10^5 damaged lines at the image on the board; SAC_FUZZ_SEED=n makes others, SAC_FUZZ_LINES=n fewer
 	@$(MAKE) -s --no-print-directory $(BUILD)/image/test_image_fuzz $(BUILD)/sac.hex
 	@SAC_FUZZ_LINES=$${SAC_FUZZ_LINES:-100000} $(BUILD)/image/test_image_fuzz
+
+.PHONY: test-ninja-long
+test-ninja-long: ## the Ninja: 1,000 random programs, 500 moves, centring from 100 places, 10^5 random bytes (some minutes)
+	@$(MAKE) -s --no-print-directory $(filter %/test_ninja_programs %/test_ninja_motion %/test_ninja_centring %/test_ninja_language,$(IMAGE_BINS)) $(BUILD)/ninja.hex
+	@SAC_NINJA_PROGRAMS=$${SAC_NINJA_PROGRAMS:-1000} $(BUILD)/image/test_ninja_programs
+	@SAC_NINJA_MOVES=$${SAC_NINJA_MOVES:-500} $(BUILD)/image/test_ninja_motion
+	@SAC_NINJA_STARTS=$${SAC_NINJA_STARTS:-100} $(BUILD)/image/test_ninja_centring
+	@SAC_NINJA_BYTES=$${SAC_NINJA_BYTES:-50000} $(BUILD)/image/test_ninja_language
 
 .PHONY: test-nodes-long
 test-nodes-long: ## 10^4 commands to three images on a line that loses packets (a minute); SAC_NODE_COMMANDS=n, SAC_NODE_LOSS=n
