@@ -6,16 +6,17 @@
 
 typedef struct {
     enum { UNTIL_NEGATIVE, UNTIL_BEYOND, ALL } until; /* the sensor says so; or all of its steps */
+    bool far; /* from anywhere; or it is near */
     uint32_t step_us;
 } leg_t;
 
 /* A leg is left out if what it looks for is so already. It goes in the positive direction to get there, else in the
  * negative one. */
 static const leg_t legs[] = {
-    {UNTIL_BEYOND, PATH_CYCLE_US(NINJA_SEARCH_STEPS_PER_S)},
-    {UNTIL_NEGATIVE, PATH_CYCLE_US(NINJA_SEARCH_STEPS_PER_S)},
-    {ALL, PATH_CYCLE_US(NINJA_SEARCH_STEPS_PER_S)},
-    {UNTIL_BEYOND, PATH_CYCLE_US(NINJA_APPROACH_STEPS_PER_S)},
+    {UNTIL_BEYOND, true, PATH_CYCLE_US(NINJA_SEARCH_STEPS_PER_S)},
+    {UNTIL_NEGATIVE, true, PATH_CYCLE_US(NINJA_SEARCH_STEPS_PER_S)},
+    {ALL, false, PATH_CYCLE_US(NINJA_SEARCH_STEPS_PER_S)},
+    {UNTIL_BEYOND, false, PATH_CYCLE_US(NINJA_APPROACH_STEPS_PER_S)},
 };
 #define LEGS (sizeof legs / sizeof legs[0])
 
@@ -66,9 +67,9 @@ static void next_leg(void)
 static void begin_leg(void)
 {
     const path_limits_t *limits = &path_limits[axis];
-    int16_t steps = (int16_t)(limits->max - limits->min + NINJA_SEARCH_MARGIN + limits->backlash);
-    if (legs[leg].until == ALL) {
-        steps = (int16_t)(limits->backlash + NINJA_RUN_UP);
+    int16_t steps = (int16_t)(limits->backlash + (legs[leg].far ? limits->max - limits->min : NINJA_RUN_UP));
+    if (legs[leg].until != ALL) {
+        steps = (int16_t)(steps + NINJA_SEARCH_MARGIN);
     }
     if (legs[leg].until != UNTIL_BEYOND) {
         steps = (int16_t)-steps;
