@@ -56,8 +56,8 @@
 #endif
 
 /* Centring: how fast the sensor's edge is looked for, how fast it is approached in the end, how many steps more than
- * the backlash lie before it then, and how many more than the whole travel and the backlash a search takes before it
- * is given up. */
+ * the backlash lie before it then, and how many more than the sensor can be away either takes before it is given up:
+ * more than the whole travel and the backlash, or than those steps and the backlash. */
 #ifndef NINJA_SEARCH_STEPS_PER_S
 #define NINJA_SEARCH_STEPS_PER_S 200
 #endif

@@ -137,10 +137,10 @@ static void do_something(void)
         play_run(below(4) ? below(200) * MS + below(1000) * US : below(2000) * MS);
     } else if (kind < 93) {
         play_rests(SECOND);
-    } else if (kind < 99) {
-        add(&text, "\b");
     } else {
-        add(&text, "\022");
+        play_sent(); /* not so near to what was typed before that it is not clear what it halts */
+        play_run(4 * MS + below(30000) * US);
+        add(&text, kind < 99 ? "\b" : "\022");
     }
     if (verbose)
         printf("%.3f %s\n", (double)board_cycle(board) / SECOND, text.length ? text.text : "...");
