@@ -1,5 +1,6 @@
 /* motion/group: shape and runs of groups. On the AVR, where it is assembler, the same as in C for each of many groups. */
 #include "motion/group.h"
+#include "host/any_value.h"
 #include "unity.h"
 
 /* group.c once more, under other names. */
@@ -25,20 +26,6 @@ void setUp(void)
 
 void tearDown(void)
 {
-}
-
-static uint32_t next_bits(void)
-{
-    static uint64_t state = 1;
-    state = state * 6364136223846793005u + 1442695040888963407u;
-    return (uint32_t)(state >> 32);
-}
-
-/* Of all lengths. */
-static uint32_t next_value(void)
-{
-    uint32_t bits = next_bits();
-    return bits >> (next_bits() >> 27);
 }
 
 /* Any ramp, whether there can be such a one or not. */

@@ -1,5 +1,6 @@
 /* motion/ramp: on the AVR, where its groups come from assembler, the same as in C for each of many ramps, possible or not. */
 #include "motion/ramp.h"
+#include "host/any_value.h"
 #include "unity.h"
 #include <string.h>
 
@@ -30,20 +31,6 @@ void setUp(void)
 
 void tearDown(void)
 {
-}
-
-static uint32_t next_bits(void)
-{
-    static uint64_t state = 1;
-    state = state * 6364136223846793005u + 1442695040888963407u;
-    return (uint32_t)(state >> 32);
-}
-
-/* Of all lengths. */
-static uint32_t next_value(void)
-{
-    uint32_t bits = next_bits();
-    return bits >> (next_bits() >> 27);
 }
 
 static uint32_t value_of_bits(uint8_t bits)

@@ -13,47 +13,18 @@ import re
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 import unittest
 
-HERE = os.path.dirname(os.path.abspath(__file__))
-TOP = os.path.dirname(os.path.dirname(HERE))
-import terminal  # noqa: E402  (test/sim/terminal.py)
-from terminal import PATIENCE_S  # noqa: E402
+import terminal  # (test/sim/terminal.py)
+from simulator import Simulator, built  # (test/sim/simulator.py)
+from terminal import PATIENCE_S
 
-NINJASIM = os.path.abspath(os.environ.get("NINJASIM", os.path.join(TOP, "build", "ninjasim")))
-FIRMWARE = os.path.abspath(os.environ.get("NINJA_ELF", os.path.join(TOP, "build", "ninja.elf")))
-AVR = os.environ.get("AVR", "avr-")
+SIM = Simulator("ninjasim", "ninja_probe.c")
+setUpModule, tearDownModule, path_of, run = SIM.set_up, SIM.tear_down, SIM.path_of, SIM.run
+NINJASIM = SIM.path
+FIRMWARE = built("NINJA_ELF", "ninja.elf")
 MENU = b"\x1d"  # Ctrl-]
-
-folder = None  # of all files that the tests make
-probe = None  # the small image
-
-
-def setUpModule():
-    global folder, probe
-    folder = tempfile.TemporaryDirectory(prefix="ninjasim-test-")
-    probe = path_of("ninja_probe.elf")
-    subprocess.run(
-        [AVR + "gcc", "-mmcu=atmega328p", "-Os", "-Wall", "-Wextra", "-Werror", "-o", probe]
-        + [os.path.join(HERE, "ninja_probe.c")],
-        check=True,
-    )
-
-
-def tearDownModule():
-    folder.cleanup()
-
-
-def path_of(name):
-    return os.path.join(folder.name, name)
-
-
-def run(*arguments, image=None, given=b"", fast=True):
-    """Runs ninjasim to its end, `given` piped into it; returns the completed process, output as bytes."""
-    command = [NINJASIM] + (["--fast"] if fast else []) + list(arguments) + [image or probe]
-    return subprocess.run(command, input=given, capture_output=True, timeout=60)
 
 
 def state_of(done):
@@ -68,7 +39,7 @@ class Screen(terminal.Terminal):
     ROWS, COLUMNS = 24, 100
 
     def __init__(self, *arguments, image=None, rows=ROWS, columns=COLUMNS):
-        super().__init__([NINJASIM, *arguments, image or probe], rows=rows, columns=columns, term="vt52")
+        super().__init__([NINJASIM, *arguments, image or SIM.probe], rows=rows, columns=columns, term="vt52")
         self.shown = [[" "] * columns for _ in range(rows)]
         self.row = self.column = self.done = 0
 
@@ -212,7 +183,7 @@ class Complaints(unittest.TestCase):
         done = subprocess.run([NINJASIM], capture_output=True, stdin=subprocess.DEVNULL, timeout=10)
         self.assertEqual(done.returncode, 2)
         self.assertIn(b"which image?", done.stderr)
-        self.complains(2, b"one too many", probe)
+        self.complains(2, b"one too many", SIM.probe)
         self.complains(2, b"--start: '5' is not X,Y", "--start", "5")
         self.complains(2, b"--start: '1801' is not a number from -1800 to 1800", "--start", "1801,0")
         self.complains(2, b"--backlash: '1.5' is not a whole number", "--backlash", "0,1.5")
@@ -234,7 +205,7 @@ class Complaints(unittest.TestCase):
         self.assertRegex(run("--version").stdout, rb"^ninjasim \d")
 
     def test_terminal_that_cannot_be_drawn_on(self):
-        with terminal.Terminal([NINJASIM, probe], term="no-such-terminal") as t:
+        with terminal.Terminal([NINJASIM, SIM.probe], term="no-such-terminal") as t:
             t.expect(rb"this terminal cannot be drawn on")
             self.assertEqual(t.end(), (1, t.before))
 

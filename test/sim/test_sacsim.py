@@ -14,56 +14,28 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import termios
 import time
 import unittest
 
-HERE = os.path.dirname(os.path.abspath(__file__))
-TOP = os.path.dirname(os.path.dirname(HERE))
+import terminal  # (test/sim/terminal.py)
+from simulator import HERE, TOP, Simulator, built  # (test/sim/simulator.py)
+from terminal import PATIENCE_S, Reader
+
 sys.path.insert(0, os.path.join(TOP, "tools"))
 import edges  # noqa: E402  (tools/edges.py)
-import terminal  # noqa: E402  (test/sim/terminal.py)
-from terminal import PATIENCE_S, Reader  # noqa: E402
 
-SACSIM = os.path.abspath(os.environ.get("SACSIM", os.path.join(TOP, "build", "sacsim")))
-FIRMWARE = os.path.abspath(os.environ.get("SAC_ELF", os.path.join(TOP, "build", "sac.elf")))
-AVR = os.environ.get("AVR", "avr-")
+SIM = Simulator("sacsim", "probe.c")
+setUpModule, tearDownModule, path_of, run = SIM.set_up, SIM.tear_down, SIM.path_of, SIM.run
+SACSIM = SIM.path
+FIRMWARE = built("SAC_ELF", "sac.elf")
 MENU = b"\x1d"  # Ctrl-]
-
-folder = None  # of all files that the tests make
-probe = None  # the small image
-
-
-def setUpModule():
-    global folder, probe
-    folder = tempfile.TemporaryDirectory(prefix="sacsim-test-")
-    probe = path_of("probe.elf")
-    subprocess.run(
-        [AVR + "gcc", "-mmcu=atmega328p", "-Os", "-Wall", "-Wextra", "-Werror", "-o", probe]
-        + [os.path.join(HERE, "probe.c")],
-        check=True,
-    )
-
-
-def tearDownModule():
-    folder.cleanup()
-
-
-def path_of(name):
-    return os.path.join(folder.name, name)
-
-
-def run(*arguments, image=None, given=b"", fast=True):
-    """Runs sacsim to its end, `given` piped into it; returns the completed process, output as bytes."""
-    command = [SACSIM] + (["--fast"] if fast else []) + list(arguments) + [image or probe]
-    return subprocess.run(command, input=given, capture_output=True, timeout=60)
 
 
 def run_slowly(keys, *arguments):
     """Types the keys one by one with pauses (the probe is deaf while it makes pulses); returns output and exit code."""
     with subprocess.Popen(
-        [SACSIM, *arguments, probe], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        [SACSIM, *arguments, SIM.probe], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as child:
         time.sleep(0.2)
         for key in keys:
@@ -78,7 +50,7 @@ class Terminal(terminal.Terminal):
     """sacsim as a user runs it."""
 
     def __init__(self, *arguments, image=None, **screen):
-        super().__init__([SACSIM, *arguments, image or probe], **screen)
+        super().__init__([SACSIM, *arguments, image or SIM.probe], **screen)
 
     def expect_status(self, pattern, row=24):
         """Waits for a status line in that row that has the pattern."""
@@ -161,7 +133,7 @@ class Complaints(unittest.TestCase):
         self.assertIn(b"which image?", done.stderr)
 
     def test_two_images(self):
-        self.complains(2, b"one too many", probe)
+        self.complains(2, b"one too many", SIM.probe)
 
     def test_missing_image(self):
         self.complains(1, b"cannot read /nowhere.elf: No such file", image="/nowhere.elf")
@@ -302,7 +274,7 @@ class Recordings(unittest.TestCase):
     def test_signal_leaves_whole_files(self):
         path = path_of("killed.edges")
         with subprocess.Popen(
-            [SACSIM, "--edges", path, probe], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+            [SACSIM, "--edges", path, SIM.probe], stdin=subprocess.PIPE, stdout=subprocess.PIPE
         ) as child:
             Reader(child.stdout.fileno()).expect(b"SAC>")
             child.terminate()
@@ -349,7 +321,7 @@ class Eeprom(unittest.TestCase):
 
     def test_change_is_saved_while_running_and_no_other_file_stays(self):
         with subprocess.Popen(
-            [SACSIM, "--eeprom", self.path, probe], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+            [SACSIM, "--eeprom", self.path, SIM.probe], stdin=subprocess.PIPE, stdout=subprocess.PIPE
         ) as child:
             Reader(child.stdout.fileno()).expect(b"SAC>")
             child.stdin.write(b"w")
@@ -360,7 +332,7 @@ class Eeprom(unittest.TestCase):
             child.kill()
         self.assertEqual(self.content()[7], 0x5A)
         name = os.path.basename(self.path)
-        self.assertEqual([f for f in os.listdir(folder.name) if f.startswith(name)], [name])
+        self.assertEqual([f for f in os.listdir(SIM.folder.name) if f.startswith(name)], [name])
 
 
 class AtTheTerminal(unittest.TestCase):
@@ -548,7 +520,7 @@ class SerialPort(unittest.TestCase):
 
     def start(self, *arguments, image=None):
         child = subprocess.Popen(
-            [SACSIM, "--pty", *arguments, image or probe],
+            [SACSIM, "--pty", *arguments, image or SIM.probe],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
