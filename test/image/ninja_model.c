@@ -159,9 +159,11 @@ static void begin_leg(ninja_model_t *m)
 {
     const uint8_t axis = m->centre.axis;
     const unsigned leg = m->centre.leg;
-    const int travel = axis_of[axis].max - axis_of[axis].min + NINJA_SEARCH_MARGIN + axis_of[axis].backlash;
+    const bool near = leg == LEGS - 1; /* the approach, from where the run-up has led */
+    const int away = near || legs[leg].until == RUN_UP ? NINJA_RUN_UP : axis_of[axis].max - axis_of[axis].min;
+    const int margin = legs[leg].until == RUN_UP ? 0 : NINJA_SEARCH_MARGIN;
     m->move.steps[AXIS_X] = m->move.steps[AXIS_Y] = 0;
-    m->move.steps[axis] = (unsigned)(legs[leg].until == RUN_UP ? axis_of[axis].backlash + NINJA_RUN_UP : travel);
+    m->move.steps[axis] = (unsigned)(axis_of[axis].backlash + away + margin);
     m->move.direction[axis] = legs[leg].direction;
     begin_move(m, RATE(legs[leg].steps_per_s));
 }
