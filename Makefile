@@ -110,7 +110,8 @@ NINJA_SRCS := \
     firmware/ninja/path.c \
     firmware/ninja/hal/stepper.c \
     firmware/ninja/hal/receive.c \
-    firmware/ninja/hal/sensors.c
+    firmware/ninja/hal/sensors.c \
+    firmware/ninja/hal/watchdog.c
 
 # -- the tests -------------------------------------------------------------------------------------------------------
 # Host tests: test/host/<name>.c, one binary a module, with the sources that <name>_SRCS lists; <name>_HOST_SRCS are

@@ -23,7 +23,6 @@ LEVEL = {"base": 0, "motion": 1, "eeprom": 1, "net": 1, "queue": 2, "cli": 3, "m
 # Files outside hal/ that may include the AVR's headers, and why.
 HARDWARE = {
     "main.c": "boot: reset cause and start-up order",
-    "ninja/main.c": "boot: reset cause and watchdog",
     "base/flash.h": "the one place that knows how constants in flash are read; plain memory on the host",
 }
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^">]+)[">]')

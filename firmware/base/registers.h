@@ -2,7 +2,8 @@
  * -mcall-prologues has in the image anyway.
  *
  * save_registers: r2 to r17, r28 and r29 on the stack, and below them a frame of so many bytes, of which the first is at
- * Y + 1; Z is lost, X has their number. restore_registers: and back to the caller; nothing else may be on the stack. Errors: none. Source: avr-gcc, libgcc's __prologue_saves__. */
+ * Y + 1; Z is lost, X has their number. restore_registers: and back to the caller; nothing else may be on the stack.
+ * Context: functions of the main loop. Errors: none. Source: avr-gcc, libgcc's __prologue_saves__. */
 #ifndef BASE_REGISTERS_H
 #define BASE_REGISTERS_H
 

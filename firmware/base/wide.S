@@ -1,6 +1,6 @@
-/* See wide.h. Cycles with call and return: add, subtract 96; multiply 300; set 25; divide about 140 per byte of the quotient;
- * root 1,200; shift 50 and 11 a bit; copy 80; fraction 65. Little-endian, arguments by the avr-gcc calling convention; wide_set and
- * wide_copy leave r20 to r25 as they are. */
+/* See wide.h. Cycles with call and return: add, subtract 96; multiply 300; set 25; divide about 140 per byte of the
+ * quotient; root 1,200; shift 50 and 11 a bit; copy 80; fraction 65. Little-endian, arguments by the avr-gcc calling
+ * convention; wide_set and wide_copy leave r20 to r25 as they are. */
 
         .section .text.wide_copy, "ax", @progbits
         .global wide_copy

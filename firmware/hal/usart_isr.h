@@ -1,4 +1,6 @@
-/* What usart_receive.S and usart_transmit.S share: how their interrupts begin. */
+/* What usart_receive.S and usart_transmit.S share: how their interrupts begin. An assembler's header.
+ *
+ * Context: interrupts of USART0. Errors: none. Source: ATmega328P datasheet DS40002061, 20.11.3; why: usart_receive.S. */
 #ifndef HAL_USART_ISR_H
 #define HAL_USART_ISR_H
 

@@ -234,6 +234,8 @@ static NOINLINE uint8_t early_periods(const segment_t *s)
     return (uint8_t)((s->flags & SEGMENT_EARLY_MASK) >> SEGMENT_EARLY_SHIFT);
 }
 
+_Static_assert(SEGMENT_EARLY1_BELOW_TICKS <= UINT8_MAX, "early_of() looks at the low byte of what is below it");
+
 /* The same for periods of top + 1 ticks. */
 static NOINLINE uint8_t early_of(uint16_t top)
 {

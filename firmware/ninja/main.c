@@ -1,6 +1,4 @@
 /* The Ninja, a pan and tilt head: boot, then the polled loop. */
-#include <avr/io.h>
-#include <avr/wdt.h>
 #include "base/atomic.h"
 #include "base/timebase_port.h"
 #include "base/wake.h"
@@ -11,13 +9,11 @@
 #include "ninja/receive_port.h"
 #include "ninja/sensor_port.h"
 #include "ninja/stepper_port.h"
+#include "ninja/watchdog_port.h"
 
 int main(void)
 {
-    /* First: after its reset the watchdog runs on with its shortest period, 16 ms (datasheet 11.8.2, 11.9). A program
-     * that hangs leaves no coil on: the reset switches all pins off. */
-    MCUSR = 0;
-    wdt_enable(WDTO_120MS);
+    watchdog_port_init();
     sensor_port_init();
     stepper_port_init();
     drive_init();
@@ -29,7 +25,7 @@ int main(void)
     for (;;) {
         /* Cleared before the polls: what an interrupt leaves to do meanwhile is seen in this round or the next. */
         wake_flag = 0;
-        wdt_reset();
+        watchdog_port_alive();
         bool worked = drive_poll();
         /* After it: a halt character that has ended a move is attended to before anything else is begun. */
         int16_t byte;

@@ -4,7 +4,7 @@
  * keeps a short ring of them filled, the timer's interrupt makes the steps.
  * Units:   ticks of 0.5 us. A wait begins where the one before has ended, so there is no drift. One that comes too late
  *          for that begins late: no step is lost.
- * Context: main loop. Errors: none. Tests: test/host/fakes/stepper_port_fake.c; test/image/test_ninja_image.c.
+ * Context: main loop. Errors: none. Tests: test/host/fakes/head_fake.c stands in for it; test/image.
  * Source:  seed lines N105-110 (two coils at a time, off between moves); decisions 0.5. */
 #ifndef NINJA_STEPPER_PORT_H
 #define NINJA_STEPPER_PORT_H

@@ -1,6 +1,6 @@
 /* motion/group: shape and runs of groups. On the AVR, where it is assembler, the same as in C for each of many groups. */
 #include "motion/group.h"
-#include "host/any_value.h"
+#include "host/any_ramp.h"
 #include "unity.h"
 
 /* group.c once more, under other names. */
@@ -31,16 +31,10 @@ void tearDown(void)
 /* Any ramp, whether there can be such a one or not. */
 static void choose_ramp(void)
 {
-    uint32_t bits = next_bits();
-    ramp.linear = bits & 1;
-    ramp.faster = bits >> 1 & 1;
-    ramp.steep = (uint8_t)((bits >> 2 & 0xFF) % 3);
-    ramp.cycles_log2 = (uint8_t)((bits >> 10 & 0xFF) % 6);
-    ramp.split_ticks = (uint8_t)(bits >> 20 & 1 ? 128 : 0);
-    ramp.least_run = (uint8_t)(1u << (bits >> 21 & 3));
+    uint32_t bits = choose_kind(&ramp);
     ramp.ticks = (uint16_t)next_value();
     ramp.rate = next_value();
-    ramp.rest = bits >> 27 == 0;
+    ramp.rest = bits >> 4 == 0;
     group.sum_q16 = next_value();
     block.runs = 0;
 }

@@ -31,8 +31,8 @@ static void go(int x, int y, uint32_t step_us)
     drive_to(target, step_us);
 }
 
-/* Plays so many steps, or all; the drive is halted after them. */
-static void play(unsigned steps)
+/* Plays so many steps, or all; the drive is halted after them. What follows each step is done behind it. */
+static void play_and(unsigned steps, void (*after_step)(void))
 {
     while (drive_runs()) {
         while (drive_poll()) {
@@ -44,7 +44,14 @@ static void play(unsigned steps)
         else
             steps--;
         head_fake_play();
+        if (after_step)
+            after_step();
     }
+}
+
+static void play(unsigned steps)
+{
+    play_and(steps, NULL);
 }
 
 static double ms_between(unsigned event, unsigned later)
@@ -197,18 +204,7 @@ static void test_the_platform_stands_where_it_was_sent(void)
         go(x, y, 2000);
         const bool halted = i % 3 == 0;
         unsigned steps = halted ? (unsigned)between(0, 2 * span) : UINT32_MAX;
-        while (drive_runs()) { /* as play(), with the linkage following each step */
-            while (drive_poll()) {
-            }
-            if (!drive_runs())
-                break;
-            if (steps == 0)
-                drive_halt();
-            else
-                steps--;
-            head_fake_play();
-            follow();
-        }
+        play_and(steps, follow);
         TEST_ASSERT_EQUAL(platform(AXIS_X), path_position(AXIS_X));
         TEST_ASSERT_EQUAL(platform(AXIS_Y), path_position(AXIS_Y));
         if (!halted) {

@@ -1,6 +1,6 @@
 /* motion/ramp: on the AVR, where its groups come from assembler, the same as in C for each of many ramps, possible or not. */
 #include "motion/ramp.h"
-#include "host/any_value.h"
+#include "host/any_ramp.h"
 #include "unity.h"
 #include <string.h>
 
@@ -85,15 +85,9 @@ static wide_t next_wide(void)
 /* Any ramp, whether there can be such a one or not. */
 static void choose_ramp(void)
 {
-    uint32_t bits = next_bits();
-    ramp.linear = bits & 1;
-    ramp.faster = bits >> 1 & 1;
-    ramp.steep = (uint8_t)((bits >> 2 & 0xFF) % 3);
-    ramp.cycles_log2 = (uint8_t)((bits >> 10 & 0xFF) % 6);
-    ramp.split_ticks = (uint8_t)(bits >> 20 & 1 ? 128 : 0);
-    ramp.least_run = (uint8_t)(1u << (bits >> 21 & 3));
-    ramp.k_lacks = (uint8_t)(bits >> 23 & 7);
-    ramp.bounded = bits >> 26 == 0;
+    uint32_t bits = choose_kind(&ramp);
+    ramp.k_lacks = (uint8_t)(bits & 7);
+    ramp.bounded = bits >> 3 == 0;
     bits = next_bits();
     ramp.group_log2 = (uint8_t)((bits & 0xFF) % (GROUP_MAX_LOG2 + 1));
     ramp.most_log2 = (uint8_t)(bits >> 8 & 1 ? GROUP_MAX_LOG2 : (bits >> 9 & 0xFF) % (GROUP_MAX_LOG2 + 1));

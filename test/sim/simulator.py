@@ -3,6 +3,7 @@
 import os
 import subprocess
 import tempfile
+import unittest
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 TOP = os.path.dirname(os.path.dirname(HERE))
@@ -40,3 +41,15 @@ class Simulator:
         """Runs it to its end, `given` piped into it; returns the completed process, output as bytes."""
         command = [self.path] + (["--fast"] if fast else []) + list(arguments) + [image or self.probe]
         return subprocess.run(command, input=given, capture_output=True, timeout=60)
+
+
+class Complaining(unittest.TestCase):
+    """Wrong options and files: a message that names the trouble, and the exit code."""
+
+    sim = None
+
+    def complains(self, code, words, *arguments, image=None):
+        done = self.sim.run(*arguments, image=image)
+        self.assertEqual(done.returncode, code, done.stderr)
+        self.assertIn(words, done.stderr)
+        self.assertEqual(done.stdout, b"")

@@ -17,7 +17,7 @@ import time
 import unittest
 
 import terminal  # (test/sim/terminal.py)
-from simulator import Simulator, built  # (test/sim/simulator.py)
+from simulator import Complaining, Simulator, built  # (test/sim/simulator.py)
 from terminal import PATIENCE_S
 
 SIM = Simulator("ninjasim", "ninja_probe.c")
@@ -170,14 +170,8 @@ class Script(unittest.TestCase):
             self.assertAlmostEqual(state["seconds"], 0.8, delta=0.001)
 
 
-class Complaints(unittest.TestCase):
-    """Wrong options and files: a message that names the trouble, and the exit code."""
-
-    def complains(self, code, words, *arguments, image=None):
-        done = run(*arguments, image=image)
-        self.assertEqual(done.returncode, code, done.stderr)
-        self.assertIn(words, done.stderr)
-        self.assertEqual(done.stdout, b"")
+class Complaints(Complaining):
+    sim = SIM
 
     def test_command_line(self):
         done = subprocess.run([NINJASIM], capture_output=True, stdin=subprocess.DEVNULL, timeout=10)

@@ -19,7 +19,7 @@ import time
 import unittest
 
 import terminal  # (test/sim/terminal.py)
-from simulator import HERE, TOP, Simulator, built  # (test/sim/simulator.py)
+from simulator import HERE, TOP, Complaining, Simulator, built  # (test/sim/simulator.py)
 from terminal import PATIENCE_S, Reader
 
 sys.path.insert(0, os.path.join(TOP, "tools"))
@@ -118,14 +118,8 @@ class Script(unittest.TestCase):
         self.assertIn(b"ty", run("--wire", "out_1mhz=xclk", given=b"t").stdout)
 
 
-class Complaints(unittest.TestCase):
-    """Wrong options and files: a message that names the trouble, and the exit code."""
-
-    def complains(self, code, words, *arguments, image=None):
-        done = run(*arguments, image=image)
-        self.assertEqual(done.returncode, code, done.stderr)
-        self.assertIn(words, done.stderr)
-        self.assertEqual(done.stdout, b"")
+class Complaints(Complaining):
+    sim = SIM
 
     def test_no_image(self):
         done = subprocess.run([SACSIM], capture_output=True, stdin=subprocess.DEVNULL, timeout=10)
